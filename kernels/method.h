@@ -19,6 +19,10 @@
 #define EGOSGM_THIN_BLOCKS 2
 #define EGOSGM_THIN_REACH 8
 
+// Rows above and below one that is not matched (sgm/row_interpolation.cl) see one surface where their disparities
+// differ by no more than this.
+#define EGOSGM_ROWS_AGREE_PX 1.0f
+
 // A doubtful disparity is known to 4 px, so that the next frame searches wide: the least variance where measurement and
 // prediction contradict each other.
 #define EGOSGM_DOUBTFUL_VARIANCE_PX2 16.0f

@@ -133,8 +133,9 @@ typedef struct {
   i32 padding;  // of the census codes' rows
   i32 p1, s_max;
   f32 variance_floor, variance_per_step, variance_per_square;
-  i32 reads_off;   // whether the left view leaves ranks for the right one (sgm_cells.h)
-  i32 first_view;  // of those that are matched, which lie one behind the other in what only a match needs
+  i32 reads_off;       // whether the left view leaves ranks for the right one (sgm_cells.h)
+  i32 right_row_step;  // every so many-th row of the right view is matched, from its first one on
+  i32 first_view;      // of those that are matched, which lie one behind the other in what only a match needs
 } SgmParameters;
 
 // The motion of a view's disparity space (eqs. 1-4): rows 1, 2 and 4 of H = Gamma T Gamma^-1; row 3 is (0, 0, 1, 0).
@@ -147,7 +148,7 @@ typedef struct {
 
 #ifdef __cplusplus
 static_assert(sizeof(ImageSize) == 8 && sizeof(DisparityRange) == 8 && sizeof(Band) == 8 && sizeof(RowSum) == 8 &&
-                  sizeof(BlockRange) == 12 && sizeof(EvidenceSum) == 8 && sizeof(SgmParameters) == 48 &&
+                  sizeof(BlockRange) == 12 && sizeof(EvidenceSum) == 8 && sizeof(SgmParameters) == 52 &&
                   sizeof(DisparityMotion) == 84,
               "kernels/*.cl read these layouts");
 }  // namespace egosgm::shared

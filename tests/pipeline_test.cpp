@@ -120,9 +120,14 @@ void expect_outputs(const OutputMemory& outputs, const reference::Frame& expecte
 
 void expect_report(const FrameReport& report, const reference::Frame& expected, const Setting& setting) {
   double searched = 0;
-  const int views = !expected.predicted.disparity.empty() && !setting.options.track_right ? 1 : 2;
+  const bool has_prediction = !expected.predicted.disparity.empty();
+  const int views = has_prediction && !setting.options.track_right ? 1 : 2;
+  const int right_row_step = has_prediction ? setting.options.banded_sgm.right_row_step : 1;
   for (const reference::Pass& pass : expected.passes) {
-    for (const shared::Band& band : of_views(pass.band.bands, views)) searched += band.chunks * EGOSGM_LANES;
+    for (std::size_t i = 0; i < views * pixel_count(setting.size); ++i) {
+      const int row = static_cast<int>(i / setting.size.width), right_row = row - setting.size.height;
+      if (right_row < 0 || right_row % right_row_step == 0) searched += pass.band.bands[i].chunks * EGOSGM_LANES;
+    }
     const int coarse_chunks = SearchBand::max_chunks(CoarseMatch::coarse_range(range_of(setting.options)));
     searched += static_cast<double>(pass.coarse.size()) * coarse_chunks * EGOSGM_LANES;  // of both views
   }
@@ -131,7 +136,7 @@ void expect_report(const FrameReport& report, const reference::Frame& expected, 
   EXPECT_NEAR(report.search_fraction, searched / cells, 1e-12);
   EXPECT_NEAR(report.density, valid_part(half(expected.given_out, 0)), 1e-12);
   EXPECT_EQ(static_cast<float>(report.vertical_offset_px), expected.vertical_offset_px);
-  const double predicted = expected.predicted.disparity.empty() ? 0 : valid_part(half(expected.predicted.disparity, 0));
+  const double predicted = !has_prediction ? 0 : valid_part(half(expected.predicted.disparity, 0));
   EXPECT_NEAR(report.predicted_fraction, predicted, 1e-12);
 }
 

@@ -112,7 +112,7 @@ void FrameQueue::submit(const ImageView& left, const ImageView& right, const std
                             .bands = workspace.bands,
                             .matched = plan.matched,
                             .parts = {plan.matches, &method_.matcher().banded_sgm().stripes(),
-                                      plan.has_coarse_match ? method_.search().coarse_cells() : 0},
+                                      plan.has_coarse_match ? method_.search().coarse_cells() : 0, plan.right_row_step},
                             .offset = results.offset,
                             .dynamic = plan.wanted.dynamic ? &workspace.dynamic : nullptr,
                             .reasons = plan.wanted.reasons ? &workspace.reasons : nullptr},

@@ -28,10 +28,9 @@ double matched_cells(const MatchedFrame& frame) {
   std::uint64_t cells = frame.parts.coarse_cells;
   for (std::size_t view = 0; view < views; ++view) {
     for (const Stripe& stripe : *frame.parts.stripes) {
-      const auto first =
-          frame.row_sums.begin() + static_cast<std::ptrdiff_t>(view * frame.size.height + stripe.first_row);
-      cells = std::accumulate(first, first + stripe.rows, cells,
-                              [](std::uint64_t sum, const shared::RowSum& row) { return sum + row.cells; });
+      const std::size_t first = view * frame.size.height + stripe.first_row;
+      const int step = view == EGOSGM_LEFT ? 1 : frame.parts.right_row_step;
+      for (int row = 0; row < stripe.rows; row += step) cells += frame.row_sums[first + row].cells;
     }
   }
   return static_cast<double>(frame.parts.passes) * static_cast<double>(cells);

@@ -32,7 +32,7 @@ void MatchStep::measure(const Plan& plan, const FrameImages& images, const Searc
   if (reads_off) {
     matcher_.reading_off(images, bands, matched);
   } else {
-    matcher_.match(images, bands, matched, Views::kBoth);
+    matcher_.match(images, bands, matched, Views::kBoth, plan.right_row_step);
   }
   if (median_filter_) median_filter_->filter(matching.matched, matching.smoothed, Views::kBoth);
   const Map& smoothed = median_filter_ ? matching.smoothed : matching.matched;

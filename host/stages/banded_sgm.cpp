@@ -154,8 +154,10 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
                   .variance_per_step = options.variance_per_step_px2,
                   .variance_per_square = options.variance_per_square_px2,
                   .reads_off = 0,
+                  .right_row_step = 1,
                   .first_view = 0},
       launches_(launches),
+      row_interpolation_(context, size_),
       no_ranks_(context, 1) {
   if (follows_paths(context, options.scheduling)) {
     paths_.emplace(context, size_, range, options,
@@ -174,28 +176,29 @@ void BandedSgm::prepare_reading_off() {
   read_off_.emplace(context_, size_, parameters_.padding);
 }
 
-void BandedSgm::match(const MatchInputs& image, StereoMaps& measured, Views views) {
-  match_stripes(image, measured, views, /*reads_off=*/false);
+void BandedSgm::match(const MatchInputs& image, StereoMaps& measured, Views views, int right_row_step) {
+  match_stripes(image, measured, views, {.reads_off = false, .row_step = right_row_step});
 }
 
 void BandedSgm::reading_off(const MatchInputs& image, StereoMaps& measured) {
-  match_stripes(image, measured, Views::kLeft, /*reads_off=*/true);
+  match_stripes(image, measured, Views::kLeft, {.reads_off = true, .row_step = 1});
 }
 
-void BandedSgm::match_stripes(const MatchInputs& image, StereoMaps& measured, Views views, bool reads_off) {
+void BandedSgm::match_stripes(const MatchInputs& image, StereoMaps& measured, Views views, const Way& way) {
   context_.enter("BandedSgm");
-  if (!stripe_memory_) return match(image, measured, views, reads_off);
+  if (!stripe_memory_) return match(image, measured, views, way);
   for (const Stripe& stripe : stripes_) {
     stripe_memory_->load(image, stripe);
-    match(stripe_memory_->inputs(), stripe_memory_->measured(), views, reads_off);
+    match(stripe_memory_->inputs(), stripe_memory_->measured(), views, way);
     stripe_memory_->store(stripe, measured);
   }
 }
 
-void BandedSgm::match(const MatchInputs& inputs, StereoMaps& measured, Views views, bool reads_off) {
+void BandedSgm::match(const MatchInputs& inputs, StereoMaps& measured, Views views, const Way& way) {
   shared::SgmParameters parameters = parameters_;
-  parameters.reads_off = reads_off;
-  if (reads_off) read_off_->clear();
+  parameters.reads_off = way.reads_off;
+  parameters.right_row_step = way.row_step;
+  if (way.reads_off) read_off_->clear();
   if (paths_) {
     paths_->match(parameters, inputs, measured, ranks(), views);
   } else {
@@ -204,7 +207,8 @@ void BandedSgm::match(const MatchInputs& inputs, StereoMaps& measured, Views vie
       sweep(parameters, inputs, measured, at_once);
     }
   }
-  if (reads_off) read_off_->read_off(parameters, measured);
+  if (way.reads_off) read_off_->read_off(parameters, measured);
+  if (way.row_step > 1) row_interpolation_.interpolate(parameters, measured);
 }
 
 void BandedSgm::sweep(const shared::SgmParameters& parameters, const MatchInputs& inputs, StereoMaps& measured,

@@ -134,7 +134,7 @@ ALWAYS_INLINE void sweep_row(const bool meets, const bool backward, const SgmPar
 }
 
 // A sweep of a view, and what it reads and writes, from the first view that is matched on. In `backward` ones, x and y
-// count from the lower right corner.
+// count from the lower right corner; y counts the rows that are matched.
 typedef struct {
   int view;                  // of those that are matched
   global const uint* codes;  // of both views
@@ -145,6 +145,7 @@ typedef struct {
   global uchar *slots, *sums;
   global uint* ranks;  // of the right pixels, if they are kept
   global float *disparities, *variances;
+  int row_step, rows;
 } Sweep;
 
 // The row y of a sweep, from its pixel `from` to `to`. To the pixels before one on the four paths it is `left`, `above`
@@ -153,7 +154,8 @@ typedef struct {
 ALWAYS_INLINE Row row_at(const bool meets, const bool backward, const SgmParameters q, const Sweep* sweep, const int y,
                          const int from, const int to) {
   const int width = q.width, height = q.height, step = backward ? -1 : 1;
-  const int image_y = backward ? height - 1 - y : y, image_x = backward ? width - 1 - from : from;
+  const int image_y = (backward ? sweep->rows - 1 - y : y) * sweep->row_step;
+  const int image_x = backward ? width - 1 - from : from;
   const size_t first = (size_t)sweep->view * width * height + (size_t)image_y * width + image_x;
   const size_t code_stride = (size_t)width + 2 * (size_t)q.padding;
   global uchar* slots = sweep->slots;
@@ -169,7 +171,7 @@ ALWAYS_INLINE Row row_at(const bool meets, const bool backward, const SgmParamet
   row.seen = meets && q.reads_off ? sweep->ranks + (size_t)image_y * code_stride + q.padding + image_x : 0;
   row.row_above = image_y > 0 ? -(long)code_stride : 0;
   row.row_below = image_y + 1 < height ? (long)code_stride : 0;
-  row.above_right = y > 0 ? step - step * (long)width : 0;
+  row.above_right = y > 0 ? step - step * (long)width * sweep->row_step : 0;
   row.end = step * (long)(to - from);
   row.step = step;
   row.code_step = q.first_view + sweep->view == EGOSGM_LEFT ? step : -step;
@@ -181,12 +183,13 @@ ALWAYS_INLINE Row row_at(const bool meets, const bool backward, const SgmParamet
 ALWAYS_INLINE Place place_in(const bool backward, const SgmParameters q, const Sweep* sweep, const Row* row,
                              const int y, const int from, const int to, Candidate* candidates) {
   const int width = q.width, height = q.height;
-  const int image_y = backward ? height - 1 - y : y, image_x = backward ? width - 1 - from : from;
+  const int image_y = (backward ? sweep->rows - 1 - y : y) * sweep->row_step;
+  const int image_x = backward ? width - 1 - from : from;
   const size_t row_start = (size_t)sweep->view * width * height + (size_t)image_y * width;
   const size_t code_stride = (size_t)width + 2 * (size_t)q.padding;
   const int image = q.first_view + sweep->view;
   const int along = image == EGOSGM_LEFT ? image_x : width - 1 - image_x;
-  const long above = y > 0 ? -row->step * (long)width : 0, left = from > 0 ? -row->step : 0;
+  const long above = y > 0 ? -row->step * (long)width * sweep->row_step : 0, left = from > 0 ? -row->step : 0;
   global const Code* codes = (global const Code*)sweep->codes + q.padding;
   // The sums move along with the pixel; a backward sweep comes from their end. Where offsets and bands do not belong
   // together, after a kernel that failed, it stays within the sums, which begin with a row that is nobody's.
@@ -259,15 +262,15 @@ ALWAYS_INLINE void sweep_tile(const bool meets, const bool backward, const SgmPa
 // a work-item takes all tiles of a sweep, those that take half of the time: as long as a row's cells and so many a
 // pixel.
 #define CELLS_A_PIXEL 16
-static inline int rows_to_middle(const SgmParameters q, const int view, const int wave, global const RowSum* row_sums) {
-  if (wave != EGOSGM_ALL_TILES) return q.height - q.height / 2;
-  global const RowSum* rows = row_sums + (size_t)view * q.height;
+static inline int rows_to_middle(const SgmParameters q, const Sweep* sweep, const int wave) {
+  if (wave != EGOSGM_ALL_TILES) return sweep->rows - sweep->rows / 2;
+  global const RowSum* rows = sweep->row_sums + (size_t)sweep->view * q.height;
   const ulong a_row = (ulong)q.width * CELLS_A_PIXEL;
-  ulong all = a_row * q.height;
-  for (int y = 0; y < q.height; ++y) all += rows[y].cells;
+  ulong all = a_row * sweep->rows;
+  for (int y = 0; y < sweep->rows; ++y) all += rows[y * sweep->row_step].cells;
   ulong before = 0;
   int middle = 0;
-  for (; middle < q.height && 2 * before < all; ++middle) before += a_row + rows[middle].cells;
+  for (; middle < sweep->rows && 2 * before < all; ++middle) before += a_row + rows[middle * sweep->row_step].cells;
   return middle;
 }
 
@@ -275,10 +278,10 @@ static inline int rows_to_middle(const SgmParameters q, const int view, const in
 ALWAYS_INLINE void sweep_tiles(const bool meets, const bool backward, const SgmParameters q, const Sweep* sweep,
                                const int first_row, const int wave, const int tile_columns) {
   const bool all = wave == EGOSGM_ALL_TILES;
-  const int middle = rows_to_middle(q, sweep->view, wave, sweep->row_sums);
-  const int own_rows = backward ? q.height - middle : middle;
+  const int middle = rows_to_middle(q, sweep, wave);
+  const int own_rows = backward ? sweep->rows - middle : middle;
   const int first_y = meets ? own_rows : 0;
-  const int end_y = meets ? q.height : own_rows;
+  const int end_y = meets ? sweep->rows : own_rows;
   const int end_row = all ? (end_y - first_y + TILE_HEIGHT - 1) / TILE_HEIGHT : first_row + 1;
   for (int tile_y = first_row; tile_y < end_row; ++tile_y) {
     const int tile_of_wave = wave - 2 * tile_y;
@@ -299,6 +302,8 @@ ALWAYS_INLINE void sweep_view(const bool meets, const bool backward, const SgmPa
   sweep.disparities += not_matched;
   sweep.variances += not_matched;
   sweep.row_sums += (size_t)q.first_view * q.height;
+  sweep.row_step = row_step_of(q, q.first_view + sweep.view);
+  sweep.rows = rows_of(q, q.first_view + sweep.view);
   sweep.slots += (size_t)(2 * sweep.view + backward) * SLOTS_OF(q) * SLOT + SLOT_PADDING;
   if (backward) {
     sweep_tiles(meets, true, q, &sweep, first_row, wave, tile_columns);
@@ -321,7 +326,7 @@ WITH_BIT_COUNT void from_middle(const bool backward, const SgmParameters q, cons
 KERNEL void sweep_to_middle(const SgmParameters q, const int wave, const int tile_columns, global const uint* codes,
                             global const Band* bands, global const uint* offsets, global const RowSum* row_sums,
                             global const uchar* penalties, global uchar* slots, global uchar* sums) {
-  const Sweep sweep = {get_global_id(1), codes, bands, offsets, row_sums, penalties, slots, sums, 0, 0, 0};
+  const Sweep sweep = {get_global_id(1), codes, bands, offsets, row_sums, penalties, slots, sums, 0, 0, 0, 0, 0};
   to_middle(get_global_id(2) > 0, q, sweep, get_global_id(0), wave, tile_columns);
 }
 
@@ -330,7 +335,7 @@ KERNEL void sweep_from_middle(const SgmParameters q, const int wave, const int t
                               global const Band* bands, global const uint* offsets, global const RowSum* row_sums,
                               global const uchar* penalties, global uchar* slots, global const uchar* sums,
                               global uint* ranks, global float* disparities, global float* variances) {
-  const Sweep sweep = {get_global_id(1),    codes, bands,       offsets,  row_sums, penalties, slots,
-                       (global uchar*)sums, ranks, disparities, variances};
+  const Sweep sweep = {get_global_id(1),    codes, bands,       offsets,   row_sums, penalties, slots,
+                       (global uchar*)sums, ranks, disparities, variances, 0,        0};
   from_middle(get_global_id(2) > 0, q, sweep, get_global_id(0), wave, tile_columns);
 }

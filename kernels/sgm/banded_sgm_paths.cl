@@ -60,7 +60,8 @@ KERNEL __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void follow_pa
   const bool vertical = stage == 0 && group >= row_groups;
   const int direction = stage > 0 ? stage + 1 : vertical ? 1 : 0;
   const int first_line = (vertical ? group - row_groups : group) * LINES;
-  const Path path = path_of(q, direction, backward, view, line_of(q, direction, first_line + line));
+  const int rows = rows_of(q, view);
+  const Path path = path_of(q, direction, backward, view, line_of(q.width, rows, direction, first_line + line));
   const Pixels pixels = {(global const Code*)codes, penalties, bands, offsets};
   const Sums sums = {stage, vertical, backward ? backward_first : forward_first,
                      backward ? backward_second : forward_second};
@@ -72,7 +73,7 @@ KERNEL __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void follow_pa
   barrier(CLK_LOCAL_MEM_FENCE);
   int longest = 0;
   _Pragma("unroll 1") for (int i = 0; i < LINES; ++i) longest =
-      max(longest, line_of(q, direction, first_line + i).length);
+      max(longest, line_of(q.width, rows, direction, first_line + i).length);
   follow_together(q, path, longest, lane, pixels, sums, edges[0][line], minima[0][line]);
 }
 
@@ -98,13 +99,14 @@ static inline void offer(const SgmParameters q, const int x, const int y, const 
   offer_to(ranks + y * stride + q.padding + x - q.min_disparity - lane, offered);
 }
 
-// LANES work-items look at a pixel's cells, one of them at the winner's neighbours. Group ids 1 and 2: row, view.
-static inline void find_winner(const SgmParameters q, const int x, const int lane, local uint* minima,
-                               global const uint* codes, global const Band* bands, global const uint* offsets,
-                               global const uchar* forward_first, global const uchar* forward_second,
-                               global const uchar* backward_first, global const uchar* backward_second,
-                               global float* disparities, global float* variances, global uint* ranks) {
-  const size_t row_start = ((size_t)get_group_id(2) * q.height + get_group_id(1)) * q.width;
+// LANES work-items look at a pixel's cells, one of them at the winner's neighbours.
+static inline void find_winner(const SgmParameters q, const int x, const int y, const int view, const int lane,
+                               local uint* minima, global const uint* codes, global const Band* bands,
+                               global const uint* offsets, global const uchar* forward_first,
+                               global const uchar* forward_second, global const uchar* backward_first,
+                               global const uchar* backward_second, global float* disparities, global float* variances,
+                               global uint* ranks) {
+  const size_t row_start = ((size_t)view * q.height + y) * q.width;
   const bool is_inside = x < q.width;
   const size_t pixel = row_start + (is_inside ? x : 0);
   const Band band = band_at(bands, pixel);
@@ -125,8 +127,7 @@ static inline void find_winner(const SgmParameters q, const int x, const int lan
   }
   best = minimum_of_line(minima, lane, best);
   for (int at = VECTOR * lane; q.reads_off && is_inside && at <= last; at += VECTOR * LANES) {
-    offer(q, x, (int)get_group_id(1), cells_origin - q.min_disparity + at, allowed_of(cells, at, first, last),
-          best >> 16, codes, ranks);
+    offer(q, x, y, cells_origin - q.min_disparity + at, allowed_of(cells, at, first, last), best >> 16, codes, ranks);
   }
   if (is_inside && lane == 0) {
     const int total = best >> 16, winner = best & 0xffff;
@@ -139,13 +140,15 @@ static inline void find_winner(const SgmParameters q, const int x, const int lan
   }
 }
 
-// Group id 0: LINES pixels of a row.
+// Group ids: LINES pixels of a row, a row of those that are matched, a view.
 KERNEL __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void find_winners(
     const SgmParameters q, global const uint* codes, global const Band* bands, global const uint* offsets,
     global const uchar* forward_first, global const uchar* forward_second, global const uchar* backward_first,
     global const uchar* backward_second, global float* disparities, global float* variances, global uint* ranks) {
   local uint minima[LINES][MINIMA];
   const int lane = get_local_id(0) % LANES, line = get_local_id(0) / LANES;
-  find_winner(q, get_group_id(0) * LINES + line, lane, minima[line], codes, bands, offsets, forward_first,
+  const int view = get_group_id(2), y = (int)get_group_id(1) * row_step_of(q, view);
+  if (y >= q.height) return;
+  find_winner(q, get_group_id(0) * LINES + line, y, view, lane, minima[line], codes, bands, offsets, forward_first,
               forward_second, backward_first, backward_second, disparities, variances, ranks);
 }

@@ -4,9 +4,10 @@
 #define EGOSGM_KERNELS_MATCH_PATH_H
 
 #include "recurrence.h"
+#include "sgm_cells.h"
 #include "vector.h"
 
-// A way across the image: first pixel and number of pixels, seen in the direction of a forward sweep.
+// A way across the rows that are matched: first pixel and number of pixels, seen in the direction of a forward sweep.
 typedef struct {
   int x, y, length;
 } Line;
@@ -50,14 +51,14 @@ typedef struct {
 } Pixel;
 
 // Directions: 0 from the left, 1 from above, 2 from the upper left, 3 from the upper right.
-static inline Line line_of(const SgmParameters q, const int direction, const int index) {
-  const int lines = direction == 0 ? q.height : direction == 1 ? q.width : q.width + q.height - 1;
-  const int diagonal = index - (q.height - 1);
+static inline Line line_of(const int width, const int rows, const int direction, const int index) {
+  const int lines = direction == 0 ? rows : direction == 1 ? width : width + rows - 1;
+  const int diagonal = index - (rows - 1);
   Line line = {0, 0, 0};
   if (index < lines) {
-    line.x = direction == 0 ? 0 : direction == 1 ? index : direction == 2 ? max(0, diagonal) : min(index, q.width - 1);
+    line.x = direction == 0 ? 0 : direction == 1 ? index : direction == 2 ? max(0, diagonal) : min(index, width - 1);
     line.y = direction == 0 ? index : direction == 1 ? 0 : direction == 2 ? max(0, -diagonal) : index - line.x;
-    const int across = direction == 3 ? line.x + 1 : q.width - line.x, down = q.height - line.y;
+    const int across = direction == 3 ? line.x + 1 : width - line.x, down = rows - line.y;
     line.length = direction == 0 ? across : direction == 1 ? down : min(across, down);
   }
   return line;
@@ -67,13 +68,14 @@ static inline Line line_of(const SgmParameters q, const int direction, const int
 static inline Path path_of(const SgmParameters q, const int direction, const bool backward, const int view,
                            const Line line) {
   const int sign = backward ? -1 : 1, view_sign = view == EGOSGM_LEFT ? 1 : -1;
+  const int row_step = row_step_of(q, view);
   const int stride = q.width + 2 * q.padding;
   Path path;
   path.length = line.length;
   path.x = backward ? q.width - 1 - line.x : line.x;
-  path.y = backward ? q.height - 1 - line.y : line.y;
+  path.y = (backward ? rows_of(q, view) - 1 - line.y : line.y) * row_step;
   path.x_step = direction == 1 ? 0 : direction == 3 ? -sign : sign;
-  path.y_step = direction == 0 ? 0 : sign;
+  path.y_step = direction == 0 ? 0 : sign * row_step;
   path.pixel = (uint)(view * q.height + path.y) * q.width + path.x;
   path.pixel_step = path.y_step * q.width + path.x_step;
   const int along = view == EGOSGM_LEFT ? path.x : q.width - 1 - path.x;

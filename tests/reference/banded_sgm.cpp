@@ -47,6 +47,15 @@ struct View {
   std::uint64_t code(const std::vector<std::uint64_t>& codes, int x, int y) const {
     return codes[static_cast<std::size_t>(std::clamp(y, 0, q.height - 1)) * q.width + std::clamp(x, 0, q.width - 1)];
   }
+  /// Every so many-th row is matched.
+  int row_step() const { return view == EGOSGM_LEFT ? 1 : q.right_row_step; }
+  int rows() const { return (q.height + row_step() - 1) / row_step(); }
+  /// P2 of the step from the pixel before, (dx, dy rows) back: that of the lower one of the two from its neighbour.
+  int p2(int x, int y, int dx, int dy) const {
+    const int lower_x = dy < 0 ? x - dx : x, lower_y = dy < 0 ? y + row_step() : y;
+    const int upper_x = dy < 0 ? x : x - dx, upper_y = dy == 0 ? y : lower_y - 1;
+    return step_penalty(options, grey[lower_y * q.width + lower_x], grey[upper_y * q.width + upper_x]);
+  }
   int matched(int x, int d) const { return view == EGOSGM_LEFT ? x - d : x + d; }
 
   int cost(int x, int y, int d) const {
@@ -68,13 +77,13 @@ struct View {
 /// L of one path, relative to its minimum at every pixel.
 void aggregate(const View& v, int dx, int dy, Cells& costs) {
   const shared::SgmParameters& q = v.q;
-  for (int i = 0; i < q.height; ++i) {
+  for (int i = 0; i < v.rows(); ++i) {
     for (int j = 0; j < q.width; ++j) {
-      const int y = dy >= 0 ? i : q.height - 1 - i, x = dx >= 0 ? j : q.width - 1 - j;
-      const int pixel = y * q.width + x;
-      const bool starts = x - dx < 0 || x - dx >= q.width || y - dy < 0 || y - dy >= q.height;
-      const int before = (y - dy) * q.width + x - dx;
-      const int p2 = starts ? v.options.p2 : step_penalty(v.options, v.grey[pixel], v.grey[before]);
+      const int row = dy >= 0 ? i : v.rows() - 1 - i, x = dx >= 0 ? j : q.width - 1 - j;
+      const int y = row * v.row_step(), pixel = y * q.width + x;
+      const bool starts = x - dx < 0 || x - dx >= q.width || row - dy < 0 || row - dy >= v.rows();
+      const int before = (row - dy) * v.row_step() * q.width + x - dx;
+      const int p2 = starts ? v.options.p2 : v.p2(x, y, dx, dy);
       int least = 1 << 20;
       for (int d = costs.first(pixel); d <= costs.last(pixel); ++d) {
         int transition = p2;
@@ -99,6 +108,7 @@ Cells half_sum(const View& v, const shared::Band* bands, int paths, int sign) {
   }
   Cells sum(v.q, bands);
   for (int p = 0; p < v.q.width * v.q.height; ++p) {
+    if (p / v.q.width % v.row_step() != 0) continue;
     for (int d = sum.first(p); d <= sum.last(p); ++d) {
       const auto half = [&](int r) { return (costs[r].at(p, d) + costs[r + 1].at(p, d) + 1) / 2; };
       sum.at(p, d) = std::min(255, paths == 8 ? half(0) + half(2) : costs[0].at(p, d) + costs[1].at(p, d));
@@ -151,11 +161,31 @@ void read_off(const View& left, const shared::Band* bands, Cells& sums, testing:
   }
 }
 
+/// The rows of the right view between those that were matched.
+void fill_rows(const shared::SgmParameters& q, testing::HostMaps& maps) {
+  const auto fill = [&](int x, int y) {
+    const int above = y - y % q.right_row_step, next = above + q.right_row_step;
+    const auto at = [&](int row) { return static_cast<std::size_t>(q.height + row) * q.width + x; };
+    const std::size_t here = at(y), first = at(above), second = at(next < q.height ? next : above);
+    if (std::abs(maps.disparity[first] - maps.disparity[second]) <= 1) {
+      maps.disparity[here] = (maps.disparity[first] + maps.disparity[second]) / 2;
+      maps.variance[here] = (maps.variance[first] + maps.variance[second]) / 2;
+    } else {
+      const std::size_t surer = maps.variance[second] < maps.variance[first] ? second : first;
+      maps.disparity[here] = maps.disparity[surer];
+      maps.variance[here] = maps.variance[surer];
+    }
+  };
+  for (int y = 0; y < q.height; ++y) {
+    for (int x = 0; x < q.width && y % q.right_row_step != 0; ++x) fill(x, y);
+  }
+}
+
 }  // namespace
 
 testing::HostMaps banded_sgm(shared::ImageSize size, shared::DisparityRange range, const BandedSgmOptions& options,
                              const std::vector<std::uint64_t> (&codes)[2], const std::vector<std::uint16_t>& grey,
-                             const std::vector<shared::Band>& bands, bool reads_off) {
+                             const std::vector<shared::Band>& bands, bool reads_off, int right_row_step) {
   const shared::SgmParameters q{.width = size.width,
                                 .height = size.height,
                                 .min_disparity = range.min,
@@ -167,6 +197,7 @@ testing::HostMaps banded_sgm(shared::ImageSize size, shared::DisparityRange rang
                                 .variance_per_step = options.variance_per_step_px2,
                                 .variance_per_square = options.variance_per_square_px2,
                                 .reads_off = reads_off,
+                                .right_row_step = right_row_step,
                                 .first_view = 0};
   testing::HostMaps maps;
   for (int view = 0; view < 2; ++view) {
@@ -188,9 +219,10 @@ testing::HostMaps banded_sgm(shared::ImageSize size, shared::DisparityRange rang
     }
     if (q.reads_off) {
       read_off(v, band, sums, maps);
-      break;
+      return maps;
     }
   }
+  fill_rows(q, maps);
   return maps;
 }
 

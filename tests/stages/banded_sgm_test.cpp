@@ -32,6 +32,7 @@ struct Case {
   BandedSgm::Tile tile = {};
   bool reads_off = false;
   int patch = 1;  // pixels a side of what has one prediction
+  int right_row_step = 1;
 };
 
 std::string name(const ::testing::TestParamInfo<Case>& info) {
@@ -48,6 +49,7 @@ std::string name(const ::testing::TestParamInfo<Case>& info) {
   }
   if (c.tile.block_lanes > 0) text += "_blocks" + std::to_string(c.tile.block_lanes);
   if (c.reads_off) text += "_read_off";
+  if (c.right_row_step > 1) text += "_rows" + std::to_string(c.right_row_step);
   if (c.group) text += "_lanes" + std::to_string(c.group->lanes) + "_lines" + std::to_string(c.group->lines);
   return text;
 }
@@ -90,6 +92,7 @@ struct Match {
   std::vector<Stripe> stripes;
   shared::DisparityRange range;
   bool reads_off = false;
+  int right_row_step = 1;
   BandedSgmOptions options;
 };
 
@@ -121,10 +124,11 @@ Match match(const Case& c, int max_memory_mib = 0) {
   penalties.write(context, {steps.begin(), steps.end()});
   const MatchInputs inputs{device_codes, penalties, bands};
   if (c.reads_off) sgm.prepare_reading_off();
-  c.reads_off ? sgm.reading_off(inputs, measured) : sgm.match(inputs, measured, Views::kBoth);
+  c.reads_off ? sgm.reading_off(inputs, measured) : sgm.match(inputs, measured, Views::kBoth, c.right_row_step);
 
   m.range = c.range;
   m.reads_off = c.reads_off;
+  m.right_row_step = c.right_row_step;
   m.bands = bands.bands.read(context);
   m.measured = testing::download(context, measured);
   m.stripes = sgm.stripes();
@@ -148,7 +152,8 @@ TEST_P(BandedSgmTest, EqualsReference) {
   if (c.tile.block_lanes > 16 && refuses_blocks(c)) GTEST_SKIP() << "the compiler has no vectors of 32 lanes";
   const Match m = match(c);
   ASSERT_EQ(m.stripes.size(), 1u);
-  const auto expected = reference::banded_sgm(c.size, m.range, m.options, m.codes, m.grey, m.bands, m.reads_off);
+  const auto expected =
+      reference::banded_sgm(c.size, m.range, m.options, m.codes, m.grey, m.bands, m.reads_off, m.right_row_step);
   EXPECT_TRUE(testing::same_maps(m.measured, expected, c.size));
 }
 
@@ -172,7 +177,7 @@ testing::HostMaps stripe_by_stripe(const Match& m, shared::ImageSize size) {
     };
     const std::vector<std::uint64_t> codes[2] = {cut(m.codes[0], 1), cut(m.codes[1], 1)};
     const auto maps = reference::banded_sgm({size.width, stripe.rows}, m.range, m.options, codes, cut(m.grey, 2),
-                                            cut(m.bands, 2), m.reads_off);
+                                            cut(m.bands, 2), m.reads_off, m.right_row_step);
     for (int view = 0; view < 2; ++view) {
       const std::ptrdiff_t kept = static_cast<std::ptrdiff_t>(stripe.kept_end - stripe.kept_begin) * size.width;
       const std::ptrdiff_t to = (static_cast<std::ptrdiff_t>(view) * size.height + stripe.kept_begin) * size.width;
@@ -201,7 +206,8 @@ TEST(BandedSgmStripes, EqualTheTwinOfEach) {
                    .cost = cost,
                    .scheduling = scheduling,
                    .launches = reads_off ? BandedSgm::Launches::kWaves : BandedSgm::Launches::kSweepsOfAView,
-                   .reads_off = reads_off};
+                   .reads_off = reads_off,
+                   .right_row_step = reads_off ? 1 : 2};
       const Match m = match(c, scheduling == Scheduling::kPaths ? 4 : 2);
       ASSERT_GE(m.stripes.size(), 3u);
       expect_few_rows(m.stripes, c.size.height);
@@ -300,6 +306,7 @@ std::vector<Case> changed(std::vector<Case> cases, Change change) {
 
 void along_paths(Case& c) { c.scheduling = Scheduling::kPaths; }
 void read_off(Case& c) { c.reads_off = true; }
+void in_few_rows(Case& c) { c.right_row_step = c.size.width % 2 == 0 ? 2 : 3; }
 void whole_sweeps(Case& c) { c.launches = BandedSgm::Launches::kSweeps; }
 void view_by_view(Case& c) { c.launches = BandedSgm::Launches::kSweepsOfAView; }
 
@@ -369,6 +376,15 @@ INSTANTIATE_TEST_SUITE_P(ReadOffViewByView, BandedSgmTest, ValuesIn(changed(chan
 INSTANTIATE_TEST_SUITE_P(ReadOffSmallTiles, BandedSgmTest, ValuesIn(changed(in_small_tiles(), read_off)), name);
 INSTANTIATE_TEST_SUITE_P(ReadOffPaths, BandedSgmTest, ValuesIn(changed(changed(kBanded, read_off), along_paths)), name);
 INSTANTIATE_TEST_SUITE_P(ReadOffGroupedPaths, BandedSgmTest, ValuesIn(changed(in_groups(), read_off)), name);
+INSTANTIATE_TEST_SUITE_P(FewRows, BandedSgmTest, ValuesIn(changed(kBanded, in_few_rows)), name);
+INSTANTIATE_TEST_SUITE_P(FewRowsSweeps, BandedSgmTest, ValuesIn(changed(changed(kBanded, in_few_rows), whole_sweeps)),
+                         name);
+INSTANTIATE_TEST_SUITE_P(FewRowsViewByView, BandedSgmTest,
+                         ValuesIn(changed(changed(kBanded, in_few_rows), view_by_view)), name);
+INSTANTIATE_TEST_SUITE_P(FewRowsSmallTiles, BandedSgmTest, ValuesIn(changed(in_small_tiles(), in_few_rows)), name);
+INSTANTIATE_TEST_SUITE_P(FewRowsPaths, BandedSgmTest, ValuesIn(changed(changed(kBanded, in_few_rows), along_paths)),
+                         name);
+INSTANTIATE_TEST_SUITE_P(FewRowsGroupedPaths, BandedSgmTest, ValuesIn(changed(in_groups(), in_few_rows)), name);
 INSTANTIATE_TEST_SUITE_P(GroupedPaths, BandedSgmTest, ValuesIn(in_groups()), name);
 
 }  // namespace

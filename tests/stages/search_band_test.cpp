@@ -316,6 +316,8 @@ TEST(SearchBand, ReportsAllThatWasMatched) {
     EXPECT_DOUBLE_EQ(report.predicted_fraction, 1);
     EXPECT_DOUBLE_EQ(report_of(views, {1, &stripes, 0}).search_fraction, 3 * once);
     EXPECT_DOUBLE_EQ(report_of(views, {2, &whole, 0}).search_fraction, 2 * once);
+    const double of_every_third_row = views == Views::kLeft ? once : (0.08 + 3.0 / 8 * 1.12) / 2;
+    EXPECT_DOUBLE_EQ(report_of(views, {1, &whole, 0, 3}).search_fraction, of_every_third_row);
     EXPECT_DOUBLE_EQ(report_of(views, {2, &whole, 256}).search_fraction, 2 * (once + 0.01 / count(views)));
   }
 }
