@@ -39,25 +39,6 @@ class Generator {
   std::uint64_t state_;
 };
 
-Eigen::Isometry3d perturb(const Vector6& xi, const Eigen::Isometry3d& motion) {
-  const Eigen::Vector3d w = xi.tail<3>();
-  const double angle = w.norm();
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity(), v = Eigen::Matrix3d::Identity();
-  if (angle > 1e-12) {
-    const Eigen::Vector3d axis = w / angle;
-    rotation = Eigen::AngleAxisd(angle, axis).toRotationMatrix();
-    Eigen::Matrix3d k;
-    k << 0, -axis.z(), axis.y(), axis.z(), 0, -axis.x(), -axis.y(), axis.x(), 0;
-    v += (1 - std::cos(angle)) / angle * k + (1 - std::sin(angle) / angle) * k * k;
-  }
-  Eigen::Isometry3d step = Eigen::Isometry3d::Identity();
-  step.linear() = rotation;
-  step.translation() = v * xi.head<3>();
-  Eigen::Isometry3d moved = step * motion;
-  moved.linear() = Eigen::Quaterniond(moved.linear()).normalized().toRotationMatrix();
-  return moved;
-}
-
 struct Scene {
   std::vector<Eigen::Vector3d> points;    // previous left camera's frame
   std::vector<Eigen::Vector3d> measured;  // (u2, v2, d2)
@@ -87,7 +68,7 @@ bool solve_sample(const Calibration& calibration, const Scene& scene, const int 
     Vector6 right = Vector6::Zero();
     for (int s = 0; s < 3; ++s) {
       const Eigen::Vector3d p = motion * scene.points[sample[s]];
-      if (p.z() < kMinDepth_m) return false;
+      if (p.z() < kMinDepth_m) return false;  // to save time: the score counts no point behind the camera
       const Eigen::Vector3d residual = scene.measured[sample[s]] - project(calibration, p);
       const MotionJacobian j = motion_jacobian(projection_jacobian(calibration, p), p);
       normal.noalias() += j.transpose() * j;
@@ -221,6 +202,25 @@ NormalEquations accumulate(const Calibration& calibration, const MatchNoise& noi
 }
 
 }  // namespace
+
+Eigen::Isometry3d perturb(const Vector6& xi, const Eigen::Isometry3d& motion) {
+  const Eigen::Vector3d w = xi.tail<3>();
+  const double angle = w.norm();
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity(), v = Eigen::Matrix3d::Identity();
+  if (angle > 1e-12) {
+    const Eigen::Vector3d axis = w / angle;
+    rotation = Eigen::AngleAxisd(angle, axis).toRotationMatrix();
+    Eigen::Matrix3d k;
+    k << 0, -axis.z(), axis.y(), axis.z(), 0, -axis.x(), -axis.y(), axis.x(), 0;
+    v += (1 - std::cos(angle)) / angle * k + (1 - std::sin(angle) / angle) * k * k;
+  }
+  Eigen::Isometry3d step = Eigen::Isometry3d::Identity();
+  step.linear() = rotation;
+  step.translation() = v * xi.head<3>();
+  Eigen::Isometry3d moved = step * motion;
+  moved.linear() = Eigen::Quaterniond(moved.linear()).normalized().toRotationMatrix();
+  return moved;
+}
 
 std::string out_of_bounds(const StereoOdometryOptions& options, const Eigen::Isometry3d& motion) {
   const double length = motion.translation().norm();

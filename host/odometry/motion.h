@@ -31,6 +31,9 @@ MotionEstimate refine_motion(const Calibration& calibration, const StereoOdometr
                              const MatchNoise& noise, const std::vector<PointMatch>& matches,
                              const Eigen::Isometry3d& start);
 
+/// `motion`, and then the rigid motion that the twist `xi` (translation, rotation) makes in a unit of time.
+Eigen::Isometry3d perturb(const Vector6& xi, const Eigen::Isometry3d& motion);
+
 /// Why `motion` is out of the bounds in `options`; empty where it is not.
 std::string out_of_bounds(const StereoOdometryOptions& options, const Eigen::Isometry3d& motion);
 

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "host/odometry/matching.h"
@@ -164,12 +165,14 @@ TEST(OdometrySubpixel, FindsShiftUnderExposureChange) {
       second.row(y)[x] = static_cast<std::uint8_t>(std::lround(30 + 0.6 * texture(x - shift_x, y - shift_y)));
     }
   }
-  odometry::Patch patch;
-  ASSERT_TRUE(odometry::make_patch(first, 30, 31, 1.0f, patch));
-  float x = 30, y = 31;
-  ASSERT_TRUE(odometry::align_patch(patch, second, 0.9f, x, y));
-  EXPECT_NEAR(x, 30 + shift_x, 0.02);
-  EXPECT_NEAR(y, 31 + shift_y, 0.02);
+  for (const auto& [first_x, first_y] : {std::pair{30.0f, 31.0f}, {30.25f, 31.2f}}) {
+    odometry::Patch patch;
+    ASSERT_TRUE(odometry::make_patch(first, first_x, first_y, 1.0f, patch));
+    float x = first_x, y = first_y;
+    ASSERT_TRUE(odometry::align_patch(patch, second, 0.9f, x, y));
+    EXPECT_NEAR(x, first_x + shift_x, 0.02);
+    EXPECT_NEAR(y, first_y + shift_y, 0.02);
+  }
 }
 
 TEST(OdometrySubpixel, RefusesFlatPatchAndFarMove) {

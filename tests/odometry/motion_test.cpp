@@ -63,6 +63,15 @@ TEST(OdometryMotion, RecoversExactMotion) {
   }
 }
 
+TEST(OdometryMotion, HalfAStepTwiceIsAStep) {
+  odometry::Vector6 step;
+  step << 0.4, -0.2, 1.1, 0.3, -0.5, 0.2;
+  const Eigen::Isometry3d start = make_motion(0.05, -0.02, -1.2, 2.7, 0.3);
+  const Eigen::Isometry3d once = odometry::perturb(step, start),
+                          twice = odometry::perturb(step / 2, odometry::perturb(step / 2, start));
+  EXPECT_LT((once.matrix() - twice.matrix()).norm(), 1e-12);
+}
+
 TEST(OdometryMotion, RecoversMotionFromNoiseAndOutliers) {
   std::mt19937 generator(2);
   const Calibration calibration = kitti_calibration();
