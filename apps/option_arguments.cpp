@@ -9,7 +9,6 @@
 
 #include "apps/option_group.h"
 #include "apps/output_folder.h"
-#include "apps/suggestion.h"
 #include "egosgm/error.h"
 #include "egosgm/named_options.h"
 #include "vision/file_io.h"
@@ -105,11 +104,7 @@ void apply_setting(Choices& choices, const std::string& setting) {
 }
 
 void set_preset(Choices& choices, const std::string& name) {
-  const std::string nearest = suggestion(name, {"default", "paper"});
-  if (nearest != name) {
-    throw InvalidArgument("--preset \"" + name + "\": " + (nearest.empty() ? "" : "did you mean " + nearest + "? ") +
-                          "choose default or paper");
-  }
+  if (name != "default" && name != "paper") throw InvalidArgument("--preset \"" + name + "\": choose default or paper");
   choices.set("preset", name);
 }
 

@@ -19,7 +19,6 @@
 #include "apps/interrupt.h"
 #include "apps/python_tools.h"
 #include "apps/standard_output.h"
-#include "apps/suggestion.h"
 #include "egosgm/error.h"
 #include "vision/text_rows.h"
 
@@ -37,16 +36,6 @@ int fail(int code, std::string message) {
 const CLI::App& chosen_command(const CLI::App& program) {
   const auto chosen = program.get_subcommands();
   return chosen.empty() ? program : *chosen.front();
-}
-
-std::vector<std::string> names_known_to(const CLI::App& command) {
-  std::vector<std::string> names;
-  for (const CLI::Option* option : command.get_options()) {
-    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
-  }
-  for (const CLI::App* sub : command.get_subcommands([](const CLI::App*) { return true; }))
-    names.push_back(sub->get_name());
-  return names;
 }
 
 std::string help_hint(const CLI::App& command) {
@@ -74,10 +63,9 @@ int refuse_arguments(const CLI::App& program, const CLI::ParseError& error) {
                 "view: the Python package shows frames: pip install the wheel, with \"[rerun]\", and see egosgm.viewer "
                 "(docs/use/python.md); `egosgm run --write overview` draws them into files");
   }
-  const std::string nearest = suggestion(typed, names_known_to(command));
   return fail(kBadInput,
-              fmt::format("{} \"{}\": {}see `{}`", typed.starts_with("-") ? "unknown option" : "unexpected argument",
-                          typed, nearest.empty() ? "" : "did you mean " + nearest + "? ", help_hint(command)));
+              fmt::format("{} \"{}\": see `{}`", typed.starts_with("-") ? "unknown option" : "unexpected argument",
+                          typed, help_hint(command)));
 }
 
 /// Whether what --help calls the value is a number.
@@ -166,8 +154,6 @@ int run_program(int argc, const char* const* argv, const Package* package) {
   open_standard_streams();
   try {
     return parse_and_run(argc, argv, package);
-  } catch (const MissingPath& error) {
-    return failed_or_interrupted(kBadInput, error.what() + meant_path(error));
   } catch (const InvalidArgument& error) {
     return failed_or_interrupted(kBadInput, error.what());
   } catch (const Error& error) {  // of a file or of the device

@@ -10,7 +10,6 @@
 #include <utility>
 #include <vector>
 
-#include "apps/suggestion.h"
 #include "egosgm/error.h"
 #include "egosgm/vision/disparity_io.h"
 #include "egosgm/vision/evaluation.h"
@@ -75,11 +74,9 @@ std::set<std::string> parse_write_list(const std::string& list) {
     const std::string kind = CLI::detail::trim_copy(part);
     if (kind == "disparity") continue;  // always written
     if (std::find(kKinds.begin(), kKinds.end(), kind) == kKinds.end()) {
-      const std::string nearest = suggestion(kind, kKinds);
       std::string all;
       for (const std::string& known : kKinds) all += (all.empty() ? "" : ", ") + known;
-      throw InvalidArgument(fmt::format("--write \"{}\": {}choose from {}", kind,
-                                        nearest.empty() ? "" : "did you mean " + nearest + "? ", all));
+      throw InvalidArgument(fmt::format("--write \"{}\": choose from {}", kind, all));
     }
     kinds.insert(kind);
   }

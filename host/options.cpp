@@ -4,7 +4,6 @@
 
 #include <algorithm>
 
-#include "host/edit_distance.h"
 #include "host/method_options.h"
 #include "host/option_text.h"
 
@@ -94,18 +93,12 @@ void set_constant(PipelineOptions& options, std::string_view name, std::string_v
   options.constants.emplace_back(name, value);
 }
 
-/// The options nearest to a name: few letters off, or named so in part. Farther is not a typing error: empty.
-std::string nearest_to(const PipelineOptions& options, std::string_view name) {
-  std::string nearest;
-  int least = static_cast<int>(name.size()) / 3 + 1;  // letters that a typing error may change
-  for_each(options, [&](const OptionText& text, const auto&) {
-    const bool is_part = name.size() > 2 && std::string_view(text.name).find(name) != std::string_view::npos;
-    const int distance = std::min(edit_distance(name, text.name), is_part ? 3 : 1 << 20);
-    if (distance > least || name.empty()) return;
-    nearest = (distance < least ? "" : nearest.empty() ? "" : nearest + " or ") + std::string(text.name);
-    least = distance;
-  });
-  return nearest;
+/// The names of all options.
+std::string names_of(const PipelineOptions& options) {
+  std::string names;
+  for_each(options,
+           [&](const OptionText& text, const auto&) { names += (names.empty() ? "" : ", ") + std::string(text.name); });
+  return names;
 }
 
 }  // namespace
@@ -173,9 +166,7 @@ void set_option(PipelineOptions& options, std::string_view name, std::string_vie
   if (found && name == "preset")
     options = options.preset == Preset::kPaper ? PipelineOptions::paper() : PipelineOptions();
   if (found) return;
-  const std::string nearest = nearest_to(options, name);
-  throw InvalidArgument("no option named \"" + std::string(name) + "\": " +
-                        (nearest.empty() ? "`egosgm run --help` lists them" : "did you mean " + nearest + "?"));
+  throw InvalidArgument("no option named \"" + std::string(name) + "\": choose from " + names_of(options));
 }
 
 }  // namespace egosgm

@@ -2,7 +2,6 @@
 """What the tools in Python share: arguments, JSON, new files, numbers in words. Errors are InvalidArgument and IoError."""
 import argparse
 import contextlib
-import difflib
 import json
 import math
 import os
@@ -35,11 +34,10 @@ class Parser(argparse.ArgumentParser):
         given, unknown = self.parse_known_intermixed_args(arguments)
         if unknown:
             name = unknown[0].split("=")[0]
-            near = difflib.get_close_matches(name, self._option_string_actions, 1)
             kind = "unknown option" if name.startswith("-") else "unexpected argument"
             if pathlib.Path(name).suffix and pathlib.Path(name).is_file():
                 self.error(f'{kind} "{name}", a file: did the shell expand a pattern? quote it: \'*.png\'')
-            self.error(f'{kind} "{name}"' + (f": did you mean {near[0]}?" if near else ""))
+            self.error(f'{kind} "{name}"')
         return given
 
 

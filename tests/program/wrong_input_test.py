@@ -12,29 +12,27 @@ class WrongArguments(ProgramTest):
     def tearDown(self):
         self.assertFalse((self.folder / "never").exists(), "refused, but wrote")
 
-    def test_mistyped_names_get_a_suggestion(self):
-        self.assert_refused(["rnu"], "rnu", "did you mean run?")
-        self.assert_refused(["rnu", "--help"], "rnu", "did you mean run?")
-        self.assert_refused(["--versoin"], "--version")
-        self.assert_refused(self.run_with("--disparites", 64), "--disparites", "did you mean --disparities?")
-        self.assert_refused(self.run_with("--disparites=64"), "did you mean --disparities?")
-        self.assert_refused(self.run_with("--set", "p_2=64"), "p_2", "p2")
-        self.assert_refused(self.run_with("--write", "colour"), "colour", "did you mean color?")
+    def test_unknown_names_are_named(self):
+        self.assert_refused(["rnu"], "rnu", "egosgm --help")
+        self.assert_refused(["rnu", "--help"], "rnu", "egosgm --help")
+        self.assert_refused(["--versoin"], "--versoin", "egosgm --help")
+        self.assert_refused(self.run_with("--disparites", 64), "--disparites", "egosgm run --help")
+        self.assert_refused(self.run_with("--disparites=64"), "--disparites", "egosgm run --help")
+        self.assert_refused(self.run_with("--set", "p_2=64"), "p_2", "choose from", "p2")
+        self.assert_refused(self.run_with("--write", "colour"), "colour", "choose from", "color")
+        self.assert_refused(self.run_with("--preset", "papr"), "papr", "choose default or paper")
 
     def test_options_of_bags_need_one(self):
         for option in (["--left-topic", "/left"], ["--pose-topic", "/odom"], ["--max-skew-ms", 1], ["--rectify", "off"]):
             self.assert_refused(self.run_with(*option), option[0], "--bag")
 
-    def test_mistyped_paths_get_a_suggestion(self):
+    def test_a_path_that_is_not_there_is_named(self):
         mistyped = self.street.parent / "stret"
-        self.assert_refused(["run", "--odometry", mistyped, "--out", self.folder / "never"], mistyped, f"did you mean {self.street}?")
-        self.assert_refused(["eval", f"--estimate={mistyped}/truth/left_disp_occ/000000.png", "--truth", self.street],
-                            f"did you mean {self.street}/truth/left_disp_occ/000000.png?")
-        self.assert_refused(self.run_with("--poses", self.street / "pose.txt"), f"did you mean {self.street / 'poses.txt'}?")
-        done = egosgm("run", "--odometry", self.street.parent / "another", "--out", self.folder / "never")
-        self.assertNotIn("did you mean", done.stderr)
+        self.assert_refused(["run", "--odometry", mistyped, "--out", self.folder / "never"], mistyped)
+        self.assert_refused(["eval", f"--estimate={mistyped}/truth/left_disp_occ/000000.png", "--truth", self.street], mistyped)
+        self.assert_refused(self.run_with("--poses", self.street / "pose.txt"), self.street / "pose.txt")
 
-    def test_suggestions_come_from_what_was_wrong_and_its_own_kind(self):
+    def test_files_beside_change_no_refusal(self):
         folder = self.new_folder()
         for name in ("r0", "o1", "sw", "fifo", "frames", "overview", "p2=151"):
             (folder / name).touch()
@@ -43,14 +41,11 @@ class WrongArguments(ProgramTest):
                           ["--temporal", "maybe"], ["--paths", 5]):
             done = egosgm(*self.run_with(*arguments), cwd=folder)
             self.assertEqual(done.returncode, 2, arguments)
-            self.assertNotIn("did you mean", done.stderr)
         for arguments in (["synth", "--out", "never", "--frames", 0],):
             done = egosgm(*arguments, cwd=folder)
             self.assertEqual(done.returncode, 2, arguments)
-            self.assertNotIn("did you mean", done.stderr)
             self.assertNotIn("main function", done.stderr)
-        self.assert_refused(self.run_with("--set", "p3=150"), "did you mean p1 or p2?", cwd=folder)
-        self.assert_refused(self.run_with("--preset", "papr"), "did you mean paper?", cwd=folder)
+        self.assert_refused(self.run_with("--set", "p3=150"), "p3", "choose from", cwd=folder)
         config = folder / "config.toml"
         config.write_text("# options\n\n[constants.banded_sgm]\np2 = 150\np9 = 1\n")
         self.assert_refused(self.run_with("--config", config), f"{config}:5: ", "banded_sgm.p9")

@@ -773,7 +773,7 @@ def test_wrong_files_and_options_leave_nothing(tmp_path, street, frames):
     path = record("mcap", tmp_path / "drive", street, frames[:1])
     (tmp_path / "broken.mcap").write_bytes(path.read_bytes()[:200])
     for arguments, named in ((["--bag", tmp_path / "none.mcap", *TOPICS], "no such file"), (["--bag", tmp_path / "broken.mcap", *TOPICS], "broken.mcap: cannot be read as a bag"),
-                             (["--bag", path, *TOPICS, "--set", "p22=3"], "did you mean p2"), (["--bag", path, *TOPICS, "--set", "p2"], "NAME=VALUE"),
+                             (["--bag", path, *TOPICS, "--set", "p22=3"], "choose from"), (["--bag", path, *TOPICS, "--set", "p2"], "NAME=VALUE"),
                              (["--bag", path, *TOPICS, "--out", tmp_path / "no/x.mcap"], "no such folder")):
         told = program(*arguments, *([] if "--out" in arguments else ["--out", tmp_path / "out.mcap"]))
         assert told.returncode == 2 and told.stderr.startswith("egosgm: error: ") and told.stderr.count("\n") == 1, told.stderr

@@ -120,7 +120,7 @@ def test_options_have_the_librarys_names_and_defaults(street):
 
 
 @pytest.mark.parametrize("options, named", [
-    (dict(p22=3), "did you mean p2"), (dict(disparities=0), "1 to 4096"), (dict(disparities=2.5), "whole number"),
+    (dict(p22=3), "choose from"), (dict(disparities=0), "1 to 4096"), (dict(disparities=2.5), "whole number"),
     (dict(cost="sad"), "census9x7"), (dict(preset="papers"), "default, paper"), (dict(device="no such"), "no such")])
 def test_wrong_options_are_refused_by_name(street, options, named):
     with pytest.raises(egosgm.InvalidArgument, match=named) as refused:

@@ -3,7 +3,6 @@
 import contextlib
 import copy
 import ctypes
-import difflib
 import os
 import pathlib
 import sys
@@ -69,8 +68,7 @@ class EgosgmNode(LifecycleNode):
             self._declare(name, value)
         for name in self._parameter_overrides:
             if not self.has_parameter(name) and not name.startswith("qos_overrides."):
-                near = difflib.get_close_matches(name, [*OWN, *self._of_preset])
-                raise egosgm.InvalidArgument(f"no parameter named {name}" + (f": did you mean {' or '.join(near)}?" if near else ": docs/use/robots.md lists them"))
+                raise egosgm.InvalidArgument(f"no parameter named {name}: docs/use/robots.md lists them")
         self._set_later: Set[str] = set()
         self.add_on_set_parameters_callback(self._on_set)
         self._worker: Optional[threading.Thread] = None
