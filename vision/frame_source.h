@@ -54,7 +54,7 @@ class EGOSGM_EXPORT FrameSource {
 /// The pairs of files.
 class EGOSGM_EXPORT FileSource : public FrameSource {
  public:
-  /// Throws InvalidArgument where the images are of different sizes.
+  /// Throws InvalidArgument where the images are of different sizes, or where no pair can be read.
   explicit FileSource(StereoSequence sequence);
   std::optional<VideoPair> next() override;
 

@@ -49,6 +49,18 @@ class Bounds(ProgramTest):
         other.write_bytes(file.read_bytes())
         self.assert_bounded(file, "rectify", "--left", file, "--right", other, "--calib", calib, "--out", self.new_folder() / "out", says="too short")
 
+    def test_headers_of_large_images(self):
+        """No pipeline is built of a size that only a header, or only one image of a pair, has."""
+        folder, side = self.new_folder(), 4096
+        for name in ("header.png", "other.png"):
+            (folder / name).write_bytes(png(side, side, 8, []))
+        (folder / "whole.png").write_bytes(png(side, side, 8, [bytes(side)] * side))
+        for left in ("header.png", "whole.png"):
+            for command in (["run", "--disparities", 16], ["odometry"]):
+                with self.subTest(left=left, command=command[0]):
+                    self.assert_bounded(folder / "header.png" if left == "header.png" else folder / "other.png", *command, "--left", folder / left, "--right",
+                                        folder / "other.png", "--calib", self.street / "calib.txt", "--out", folder / "never", says="1 of 1 pair could not be read")
+
     def test_the_largest_map_that_a_small_file_may_hold(self):
         file = self.new_folder() / "flat.png"
         width, height = 4096, 2048  # 16 MiB of 16 bits
