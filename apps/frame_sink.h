@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <Eigen/Geometry>
-#include <optional>
-
 #include "egosgm/calibration.h"
 #include "egosgm/options.h"
 #include "egosgm/vision/image.h"
-#include "vision/frame_source.h"
+#include "vision/stereo_video.h"
 
 namespace egosgm::app {
 
@@ -22,8 +19,7 @@ class FrameSink {
   virtual ~FrameSink() = default;
   /// Before the first frame. Throws InvalidArgument and IoError.
   virtual void begin(const PipelineOptions& options, const Calibration& calibration) = 0;
-  virtual void take(const vision::VideoPair& pair, const ShownMaps& maps, const FrameReport& report,
-                    const std::optional<Eigen::Isometry3d>& current_from_previous) = 0;
+  virtual void take(const vision::VideoFrame& frame, const ShownMaps& maps) = 0;
   /// All came; or, after a begin that may have thrown, the run stopped.
   virtual void end(bool finished) = 0;
 };

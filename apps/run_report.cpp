@@ -115,9 +115,9 @@ void RunReport::take_over(const LostDevice& from) {
   json_["fallback"] = {{"from", json_of(from.device)}, {"why", from.why}};
 }
 
-void RunReport::add(const vision::VideoPair& pair, const FrameReport& report, const vision::FrameMotion& motion,
-                    const HostTimes& times, const WrittenFrame& written) {
-  const vision::StereoFrame& frame = pair.frame;
+void RunReport::add(const vision::VideoFrame& made, const HostTimes& times, const WrittenFrame& written) {
+  const FrameReport& report = made.report;
+  const vision::StereoFrame& frame = made.pair.frame;
   json_["frames"].push_back({{"frame", frame.number},
                              {"left", std::filesystem::absolute(frame.left).string()},
                              {"search_fraction", report.search_fraction},
@@ -126,18 +126,18 @@ void RunReport::add(const vision::VideoPair& pair, const FrameReport& report, co
                              {"vertical_offset_px", report.vertical_offset_px},
                              {"unpredicted", to_string(report.unpredicted)},
                              {"searched_everything", report.searched_everything},
-                             {"odometry", odometry_json(motion)},
+                             {"odometry", odometry_json(made.motion)},
                              {"launches", report.launches},
                              {"stripes", report.stripes},
                              {"outside_png_range", written.unstorable},
-                             {"ms", times_json(report, motion, times)}});
+                             {"ms", times_json(report, made.motion, times)}});
   if (const auto& cloud = written.cloud) {
     const vision::LeftOut& out = cloud->left_out;
     json_["frames"].back()["cloud"] = {
         {"points", cloud->points},
         {"left_out", {{"far", out.far}, {"uncertain", out.uncertain}, {"alone", out.alone}}}};
   }
-  if (pair.stamp_ns) json_["frames"].back()["stamp_ns"] = *pair.stamp_ns;
+  if (made.pair.stamp_ns) json_["frames"].back()["stamp_ns"] = *made.pair.stamp_ns;
   if (frame.name != fmt::format("{:06}", frame.number)) json_["frames"].back()["name"] = frame.name;
 }
 

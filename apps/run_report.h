@@ -8,7 +8,7 @@
 #include "apps/run_outputs.h"
 #include "egosgm/pipeline.h"
 #include "egosgm/vision/dataset.h"
-#include "vision/motion_source.h"
+#include "vision/stereo_video.h"
 
 namespace egosgm::app {
 
@@ -37,8 +37,7 @@ class RunReport {
   /// All that the maps depend on. Two runs with equal identities give the same maps.
   nlohmann::ordered_json identity() const;
 
-  void add(const vision::VideoPair& pair, const FrameReport& report, const vision::FrameMotion& motion,
-           const HostTimes& times, const WrittenFrame& written);
+  void add(const vision::VideoFrame& made, const HostTimes& times, const WrittenFrame& written);
 
   /// Names the numbers of `run --write reason`.
   void add_reasons();

@@ -4,8 +4,6 @@
 #include <fmt/core.h>
 
 #include <chrono>
-#include <deque>
-#include <future>
 #include <utility>
 
 #include "apps/counted.h"
@@ -19,9 +17,8 @@
 #include "egosgm/vision/calibration_io.h"
 #include "egosgm/vision/image.h"
 #include "egosgm/vision/poses_io.h"
-#include "vision/doubt.h"
 #include "vision/file_io.h"
-#include "vision/motion_source.h"
+#include "vision/stereo_video.h"
 
 namespace egosgm::app {
 namespace {
@@ -59,14 +56,6 @@ double ms_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-/// What a frame needs before the device can start.
-struct PreparedFrame {
-  vision::VideoPair pair;
-  vision::FrameMotion motion;
-  Clock::time_point read_start, odometry_start;
-  double read_ms = 0;
-};
-
 class Run {
  public:
   Run(const SequenceJob& job, const Device& device)
@@ -85,7 +74,14 @@ class Run {
                  quiet_),
         pipeline_(sequence_.calibration, size_.width, size_.height, job.options, device, source_.type()),
         report_(sequence_, pipeline_, motion_of(job), size_.width, size_.height),
-        doubt_(sequence_.has_calibration ? std::optional(sequence_.calibration) : std::nullopt, job.options) {
+        // With a device of its own, the next pair is read while this frame is written; on a CPU device one more thread
+        // would only take the kernels' cores.
+        video_(motions_, pipeline_,
+               {.calibration = sequence_.has_calibration ? std::optional(sequence_.calibration) : std::nullopt,
+                .outputs = [this] { return outputs_->views(); },
+                .is_interrupted = interrupted,
+                .reads_ahead = device.info().type != DeviceType::kCpu},
+               &source_) {
     if (job.lost) report_.take_over(*job.lost);
     if (has_folder()) folder_.begin(report_.identity());
     if (job.kinds.contains("reason")) report_.add_reasons();
@@ -140,10 +136,6 @@ class Run {
   }
 
   bool process_all() {
-    // Reading, odometry and writing run while the device works. With a device of its own, the next frame is prepared
-    // beside writing, too; on a CPU device one more thread would only take the kernels' cores.
-    const bool ahead = pipeline_.device().info().type != DeviceType::kCpu;
-    const auto policy = ahead ? std::launch::async : std::launch::deferred;
     Progress progress(static_cast<int>(sequence_.frames.size()), quiet_);
     if (!sequence_.note.empty()) note(sequence_.note, progress);
     if (!sequence_.has_calibration) progress.note(kNoCalibration);
@@ -151,64 +143,17 @@ class Run {
       progress.note(
           fmt::format("{} MiB of the device are in use; --set max_memory_mib=N bounds the matcher's part", mib));
     }
-    const auto prepare_later = [&] { return std::async(policy, [this] { return prepare(); }); };
-    auto next = prepare_later();
-    bool is_over = false;
-    while (!interrupted()) {
-      try {
-        std::optional<PreparedFrame> frame = next.get();
-        is_over = !frame;
-        if (is_over) break;
-        if (frame->pair.unreadable.empty()) {
-          submit(std::move(*frame), progress);
-        } else {
-          leave_out(frame->pair, progress);
-        }
-      } catch (const DeviceError&) {
-        throw;
-      } catch (const std::exception&) {  // what is under way does not suffer from a next frame that cannot be read
-        while (!under_way_.empty()) collect(progress);
-        throw;
+    while (const std::optional<vision::VideoFrame> frame = video_.next()) {
+      if (frame->pair.unreadable.empty()) {
+        take(*frame, progress);
+      } else {
+        leave_out(frame->pair, progress);
       }
-      next = prepare_later();
-      if (under_way_.size() > 1) collect(progress);
     }
-    while (!under_way_.empty()) collect(progress);
     if (!quiet_) summary_ = fmt::format("{:.1f} frames/s", progress.frames_per_second());
-    if (!is_over && poses_.size() + left_out_ < sequence_.frames.size())
-      return false;  // what was only read is not done
-    if (2 * left_out_ > sequence_.frames.size()) throw InvalidArgument(text_of_left_out());
-    if (motions_.has_file() && source_.has_lost_images()) {
-      throw InvalidArgument("--poses: the rows of a file belong to images one after the other, and " + sequence_.title +
-                            " has images that are in no pair: give --pose-topic, or leave the poses out");
-    }
-    return true;
+    return video_.is_complete();
   }
 
-  std::optional<PreparedFrame> prepare() {
-    PreparedFrame frame;
-    frame.read_start = Clock::now();
-    std::optional<vision::VideoPair> pair = source_.next();
-    if (!pair) return std::nullopt;
-    frame.pair = std::move(*pair);
-    frame.read_ms = ms_since(frame.read_start);
-    const std::size_t place = fed_++;
-    if (!frame.pair.unreadable.empty()) {
-      if (interrupted()) throw InvalidArgument(frame.pair.unreadable);  // a pipe that was waited for
-      return frame;
-    }
-    const vision::Image& left = frame.pair.images.left;
-    if (left.size() != size_) {
-      throw InvalidArgument(fmt::format("{} is {}x{} and the sequence {}x{}: all frames need one size",
-                                        frame.pair.frame.left.string(), left.cols, left.rows, size_.width,
-                                        size_.height));
-    }
-    frame.odometry_start = Clock::now();
-    frame.motion = motions_.next(frame.pair, place);
-    return frame;
-  }
-
-  /// A pair that cannot be read costs itself alone: the next motion is over two intervals.
   void leave_out(const vision::VideoPair& pair, Progress& progress) {
     const fs::path map = folder_.path() / output_file("disparity", pair.frame.name, pipeline_.options());
     if (has_folder() && fs::exists(map)) {
@@ -217,43 +162,24 @@ class Run {
                       "--out",
                       map.string(), pair.unreadable));
     }
-    if (left_out_++ == 0) first_left_out_ = pair.unreadable;
     report_.leave_out(pair.frame, pair.unreadable);
     progress.note(fmt::format("frame {}: left out: {}", pair.frame.name, pair.unreadable));
     progress.done(fmt::format("frame {}  left out", pair.frame.name));
   }
 
-  void submit(PreparedFrame frame, Progress& progress) {
-    if (frame.pair.starts_anew && (!poses_.empty() || !under_way_.empty())) {
-      while (!under_way_.empty()) collect(progress);
-      pipeline_.reset();
-    }
-    pipeline_.submit(vision::image_view(frame.pair.images.left), vision::image_view(frame.pair.images.right),
-                     frame.motion.motion, outputs_->views());
-    under_way_.push_back(std::move(frame));
-  }
-
-  /// The oldest frame under way: waits for it, writes and reports it.
-  void collect(Progress& progress) {
-    const FrameReport result = pipeline_.collect();
-    const PreparedFrame prepared = std::move(under_way_.front());
-    under_way_.pop_front();
-    const vision::StereoFrame& frame = prepared.pair.frame;
-    const std::optional<Motion>& motion = prepared.motion.motion;
+  /// Writes and reports a frame.
+  void take(const vision::VideoFrame& made, Progress& progress) {
+    const vision::StereoFrame& frame = made.pair.frame;
     const auto before_write = Clock::now();
-    const WrittenFrame written = has_folder() ? outputs_->write(frame, prepared.pair.images.left) : WrittenFrame();
-    if (sink_) {
-      sink_->take(prepared.pair, outputs_->shown(), result,
-                  motion ? std::optional(motion->current_from_previous) : std::nullopt);
-    }
+    const WrittenFrame written = has_folder() ? outputs_->write(frame, made.pair.images.left) : WrittenFrame();
+    if (sink_) sink_->take(made, outputs_->shown());
     if (written.cloud) add(*written.cloud);
-    const HostTimes times{prepared.read_ms, ms_since(before_write), ms_since(last_written_)};
+    const HostTimes times{made.read_ms, ms_since(before_write), ms_since(last_written_)};
     last_written_ = Clock::now();
-    if (trace_) trace(frame.name, prepared, result, before_write, times.write_ms);
-    report_.add(prepared.pair, result, prepared.motion, times, written);
-    doubt_.add(prepared.pair.images.left, prepared.pair.images.right, result, motion.has_value());
-    poses_.push_back(prepared.motion.first_from_camera);
-    tell(frame, result, prepared.motion, times, written, progress);
+    if (trace_) trace(made, before_write, times.write_ms);
+    report_.add(made, times, written);
+    poses_.push_back(made.motion.first_from_camera);
+    tell(made, times, written, progress);
   }
 
   void add(const CloudCounts& cloud) {
@@ -264,21 +190,22 @@ class Run {
     clouds_->left_out.alone += cloud.left_out.alone;
   }
 
-  void trace(const std::string& frame, const PreparedFrame& prepared, const FrameReport& result,
-             Clock::time_point before_write, double write_ms) {
-    trace_->add_host("read", frame, Trace::Row::kPrepare, prepared.read_start, prepared.read_ms);
-    if (!prepared.motion.is_given) {
-      trace_->add_host("odometry", frame, Trace::Row::kPrepare, prepared.odometry_start, prepared.motion.odometry_ms);
+  void trace(const vision::VideoFrame& made, Clock::time_point before_write, double write_ms) {
+    const std::string& frame = made.pair.frame.name;
+    trace_->add_host("read", frame, Trace::Row::kPrepare, made.read_start, made.read_ms);
+    if (!made.motion.is_given) {
+      trace_->add_host("odometry", frame, Trace::Row::kPrepare, made.odometry_start, made.motion.odometry_ms);
     }
-    trace_->add_device(result.commands, frame);
+    trace_->add_device(made.report.commands, frame);
     trace_->add_host("write", frame, Trace::Row::kWrite, before_write, write_ms);
   }
 
-  void tell(const vision::StereoFrame& frame, const FrameReport& result, const vision::FrameMotion& motion,
-            const HostTimes& times, const WrittenFrame& written, Progress& progress) {
-    if (sequence_.has_calibration && poses_.size() > 1 && !motion.motion) {
+  void tell(const vision::VideoFrame& made, const HostTimes& times, const WrittenFrame& written, Progress& progress) {
+    const vision::StereoFrame& frame = made.pair.frame;
+    const FrameReport& result = made.report;
+    if (sequence_.has_calibration && poses_.size() > 1 && !made.motion.motion) {
       progress.note(
-          fmt::format("frame {}: no motion ({}): searched the full range", frame.name, motion.odometry.reason));
+          fmt::format("frame {}: no motion ({}): searched the full range", frame.name, made.motion.odometry.reason));
     }
     if (written.unstorable > 0 && !warned_of_range_) {
       warned_of_range_ = true;
@@ -307,7 +234,7 @@ class Run {
 
   void finish(bool finished, const std::string& why_not) {
     if (sink_) sink_->end(finished);
-    const std::string doubt = doubt_.text(), of_poses = motions_.doubt();
+    const std::string doubt = video_.doubt(), of_poses = video_.doubt_of_poses();
     const std::size_t told = notes_.size();
     for (std::string& of_feed : source_.notes()) notes_.push_back(std::move(of_feed));
     report_.set_doubt(doubt.empty() || of_poses.empty() ? doubt + of_poses : doubt + "; " + of_poses, notes_);
@@ -317,7 +244,7 @@ class Run {
     if (const std::optional<Trace> trace = std::exchange(trace_, std::nullopt)) write_trace(*trace);
     if (!finished) return;
     if (quiet_) {
-      if (left_out_ > 0) say("egosgm: " + text_of_left_out());
+      if (video_.left_out() > 0) say("egosgm: " + video_.text_of_left_out());
       for (const std::string& note : notes_) say("egosgm: " + note);
       return;
     }
@@ -326,16 +253,11 @@ class Run {
     fmt::print("{}, search {:.1f} % and density {:.1f} % in the mean{}{}\n", summary_,
                100 * report_.mean("search_fraction"), 100 * report_.mean("density"), has_folder() ? ": " : "",
                folder_.path().string());
-    if (left_out_ > 0) fmt::print("{}\n", text_of_left_out());
+    if (video_.left_out() > 0) fmt::print("{}\n", video_.text_of_left_out());
     if (clouds_) fmt::print("{}\n", text_of(*clouds_, cloud_options_));
     for (std::size_t i = told; i < notes_.size(); ++i) fmt::print("{}\n", notes_[i]);
     if (!of_poses.empty()) fmt::print("{}\n", of_poses);
     if (!doubt.empty()) fmt::print("{}: `egosgm doctor {}` tells why\n", doubt, input_);
-  }
-
-  std::string text_of_left_out() const {
-    return fmt::format("{} of {} could not be read: {}", left_out_, counted(sequence_.frames.size(), "pair"),
-                       first_left_out_);
   }
 
   void write_trace(const Trace& trace) {
@@ -377,14 +299,11 @@ class Run {
   std::optional<Waiting> waiting_;     // until all is built
   Pipeline pipeline_;
   RunReport report_;
-  vision::Doubt doubt_;
+  vision::StereoVideo video_;
   std::optional<Trace> trace_;
-  std::deque<PreparedFrame> under_way_;
   Clock::time_point last_written_ = Clock::now();
   std::vector<Eigen::Isometry3d> poses_;
   std::string summary_;
-  std::size_t fed_ = 0, left_out_ = 0;
-  std::string first_left_out_;  // why
   std::vector<std::string> notes_;
   bool warned_of_range_ = false, warned_of_depth_ = false;
 };

@@ -75,6 +75,7 @@ PYBIND11_MODULE(_egosgm, module) {
   bind_pipeline(module);
   bind_odometry(module);
   bind_examination(module);
+  bind_video(module);
   bind_program(module);
   bind_files(module);
   bind_evaluation(module);

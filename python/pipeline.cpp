@@ -17,9 +17,7 @@
 #include "python/pickling.h"
 
 namespace egosgm::python {
-namespace {
 
-/// A dict of arrays to fill, or names of arrays to make.
 py::dict arrays_to_fill(const py::object& wanted, int width, int height) {
   py::dict
       arrays;  // never the caller's, which may change while the frame is under way: these references keep the arrays
@@ -40,10 +38,14 @@ py::dict arrays_to_fill(const py::object& wanted, int width, int height) {
   return arrays;
 }
 
+namespace {
+
 template <typename T>
 MapView<T> view_of(const py::dict& arrays, const char* name, MapView<T>) {
   return output_of<T>(arrays[name], name);
 }
+
+}  // namespace
 
 FrameOutputs views_of(const py::dict& arrays) {
   FrameOutputs outputs;
@@ -62,7 +64,6 @@ FrameOutputs views_of(const py::dict& arrays) {
   return outputs;
 }
 
-/// Throws InvalidArgument where a map to fill shares memory with another one of its frame or of one under way.
 void expect_apart(const py::dict& arrays, const std::deque<Frame>& under_way) {
   const py::object share = py::module_::import("numpy").attr("may_share_memory");
   std::vector<py::handle> taken;
@@ -81,6 +82,8 @@ void expect_apart(const py::dict& arrays, const std::deque<Frame>& under_way) {
     taken.push_back(array);
   }
 }
+
+namespace {
 
 std::optional<Motion> motion_of(const py::object& motion) {
   if (motion.is_none()) return std::nullopt;
@@ -168,6 +171,7 @@ class LockedPipeline {
   }
 
   const Pipeline& pipeline() const { return pipeline_; }
+  Pipeline& pipeline() { return pipeline_; }
 
  private:
   /// None in a process that was forked, where another thread's turn would never end: the pipeline says what is wrong.
@@ -237,6 +241,8 @@ void bind_frame(py::module_& module) {
 }
 
 }  // namespace
+
+Pipeline& pipeline_of(const py::object& pipeline) { return pipeline.cast<LockedPipeline&>().pipeline(); }
 
 void bind_pipeline(py::module_& module) {
   bind_frame(module);

@@ -19,7 +19,6 @@
 #include "python/bindings.h"
 #include "python/frame.h"
 #include "python/option_values.h"
-#include "vision/motion_source.h"
 
 namespace egosgm::python {
 namespace {
@@ -144,9 +143,9 @@ class Outputs : public app::FrameSink {
     in_python([&] { outputs_.call("begin", dict_of(options), calibration); });
   }
 
-  void take(const vision::VideoPair& pair, const app::ShownMaps& maps, const FrameReport& report,
-            const std::optional<Eigen::Isometry3d>& current_from_previous) override {
+  void take(const vision::VideoFrame& made, const app::ShownMaps& maps) override {
     in_python([&] {
+      const vision::VideoPair& pair = made.pair;
       py::dict frame;
       frame["number"] = pair.frame.number;
       frame["name"] = pair.frame.name;
@@ -155,12 +154,13 @@ class Outputs : public app::FrameSink {
       frame["starts_anew"] = pair.starts_anew;
       frame["frame_id"] = pair.camera;
       if (pair.stamp_ns) frame["stamp_ns"] = *pair.stamp_ns;
-      Frame made{.maps = {}, .report = report};
-      made.maps["disparity"] = array_of(maps.disparity.clone());
-      made.maps["variance"] = array_of(maps.variance.clone());
-      made.maps["reason"] = array_of(maps.reason.clone());
-      const py::object motion = current_from_previous ? py::object(array_of(*current_from_previous)) : py::none();
-      outputs_.call("take", frame, made, motion);
+      Frame result{.maps = {}, .report = made.report};
+      result.maps["disparity"] = array_of(maps.disparity.clone());
+      result.maps["variance"] = array_of(maps.variance.clone());
+      result.maps["reason"] = array_of(maps.reason.clone());
+      const std::optional<Motion>& motion = made.motion.motion;
+      outputs_.call("take", frame, result,
+                    motion ? py::object(array_of(motion->current_from_previous)) : py::object(py::none()));
     });
   }
 
@@ -248,36 +248,9 @@ int main_of(const std::vector<std::string>& arguments, const py::object& package
   return app::run_program(static_cast<int>(words.size()) - 1, words.data(), &hooks);
 }
 
-void bind_motions(py::module_& module) {
-  using vision::FrameMotion;
-  using vision::MotionSource;
-  py::class_<FrameMotion>(module, "_FrameMotion")
-      .def_readonly("motion", &FrameMotion::motion)
-      .def_readonly("odometry", &FrameMotion::odometry);
-  py::class_<MotionSource>(module, "_MotionSource")
-      .def(py::init([](const std::optional<Calibration>& calibration, const py::kwargs& values) {
-             return MotionSource(calibration, odometry_options_of(values));
-           }),
-           py::arg("calibration"))
-      .def(
-          "next",
-          [](MotionSource& self, const py::object& left, const py::object& right, const py::object& pose,
-             bool starts_anew) {
-            vision::VideoPair pair;
-            pair.images = {mat_of(left, "left"), mat_of(right, "right")};
-            if (!pose.is_none()) pair.world_from_camera = transform_of(pose, "pose");
-            pair.starts_anew = starts_anew;
-            const py::gil_scoped_release other_threads_run;
-            return self.next(pair, 0);
-          },
-          py::arg("left"), py::arg("right"), py::arg("pose") = py::none(), py::arg("starts_anew") = false)
-      .def("doubt", &MotionSource::doubt);
-}
-
 }  // namespace
 
 void bind_program(py::module_& module) {
-  bind_motions(module);
   module.def("_main", &main_of, py::arg("arguments"), py::arg("package"));
   module.def("_input_options", &input_options);
   module.def("_open_input", &open_input, py::arg("words"), py::arg("read"));

@@ -37,6 +37,7 @@ class EGOSGM_EXPORT MotionSource {
   /// sequence, grows from call to call.
   FrameMotion next(const VideoPair& pair, std::size_t frame);
 
+  bool has_odometry() const { return odometry_.has_value(); }
   /// Whether a file tells the poses.
   bool has_file() const { return !poses_.empty(); }
 

@@ -2,6 +2,7 @@
 """run(): a drive in, a disparity map for each of its frames out."""
 import contextlib
 import dataclasses
+import itertools
 import os
 import warnings
 from typing import Any, Dict, Iterable, Iterator, Optional, Sequence, Tuple, Union
@@ -73,7 +74,7 @@ class Drive:
 
     def __init__(self, source: Union[str, "os.PathLike[str]", _egosgm.StereoSequence, Bag, Iterable[Tuple[NDArray[Any], NDArray[Any]]]],
                  calibration: "_egosgm.Calibration | str | os.PathLike[str] | None" = None, *, frames: str = "", motion: bool = True,
-                 outputs: Union[str, Sequence[str]] = ("disparity", "variance"), odometry: Optional[Dict[str, Any]] = None,
+                 outputs: Union[str, Sequence[str]] = ("disparity", "variance"), odometry: Optional[Dict[str, Any]] = None, lag: int = 1,
                  progress: Optional[bool] = None, **options: Any) -> None:
         if isinstance(source, (str, os.PathLike)):
             source = _egosgm.open_folder(source, frames)
@@ -98,15 +99,19 @@ class Drive:
         if calibration is not None and not isinstance(calibration, _egosgm.Calibration):
             raise _egosgm.InvalidArgument(f"calibration: is a {type(calibration).__name__}: give an egosgm.Calibration; read_calibration reads a file")
         self.calibration = calibration
-        self._source, self._outputs, self._options = source, outputs, options
+        if lag not in (0, 1):
+            raise _egosgm.InvalidArgument(f"lag={lag!r}: choose 1, the device works while the next pair comes, or 0, a frame comes before the next pair is asked for")
+        self._source, self._outputs, self._lag, self._options = source, outputs, int(lag), options
         self._bar = _bar(progress)
         self._odometry_options = (odometry or {}) if motion and calibration is not None else None
         if odometry and self._odometry_options is None:
             raise _egosgm.InvalidArgument("odometry: has options, but without a calibration, or with motion=False, there is none: leave them out")
         self._begun = False
-        # What an iteration has of its own, ready for the next one. Made now where the size is known: what is wrong is said at once.
-        self._motions()
-        self._spare = [self._pipeline(*self.sequence.size)] if self.sequence is not None else []
+        # What is wrong with options is said at once, as far as the size is known.
+        if self._odometry_options is not None:
+            _egosgm.StereoOdometry(self.calibration, **self._odometry_options)
+        self._size = self.sequence.size if self.sequence is not None else None
+        self._spare = [self._pipeline(*self._size)] if self._size else []  # pipelines for the next iterations
 
     def __len__(self) -> int:
         return len(self._source)
@@ -123,92 +128,72 @@ class Drive:
         return iter(self._bar(self._frames(), len(self) if hasattr(self._source, "__len__") else None))
 
     def _pairs(self) -> Iterator[Tuple[Any, ...]]:
-        """Number, name, images, the camera's pose where it is known, and whether what was before says nothing of this frame."""
-        if self.sequence is not None:
-            left_out = 0
-            for frame in self.sequence.frames:
-                try:
-                    images = frame.read()
-                except _egosgm.Error as error:  # a pair that cannot be read costs itself alone
-                    left_out += 1
-                    if 2 * left_out > len(self):
-                        raise
-                    warnings.warn(f"frame {frame.name}: left out: {error}", UserWarning, stacklevel=5)
-                    continue
-                yield (frame.number, frame.name, *images, None, False)
-        elif isinstance(self._source, Bag):
+        """Left, right, the camera's pose where it is known, and whether what was before says nothing of this frame."""
+        if isinstance(self._source, Bag):
             for frame in self._source.frames():
-                pose = frame.world_from_camera if self._odometry_options is not None else None
-                yield frame.number, f"{frame.number:06d}", frame.left, frame.right, pose, frame.starts_anew and frame.number > 0
-        else:
-            first: Tuple[int, ...] = ()
-            for number, pair in enumerate(self._source):
-                if not isinstance(pair, (tuple, list)) or len(pair) != 2:
-                    raise _egosgm.InvalidArgument(f"pair {number}: is a {type(pair).__name__}: give (left, right), each an image")
-                left, right = (np.array(image) for image in pair)  # copies: a camera may use its buffers again before the frame is handed out
-                if not first and left.ndim >= 2 and os.path.isfile(self._calibration_file):
-                    read_calibration(self._calibration_file, size=left.shape[1::-1])  # refused where it is of another size
-                first = first or left.shape[:2]
-                if left.shape[:2] != first:
-                    raise _egosgm.InvalidArgument(f"pair {number}: its left image is of the shape {left.shape}, and the first one's began with {first}: "
-                                                  "all need one size")
-                yield number, f"{number:06d}", left, right, None, False
-
-    def _motions(self) -> _egosgm._MotionSource:
-        return _egosgm._MotionSource(None if self._odometry_options is None else self.calibration, **(self._odometry_options or {}))
+                yield frame.left, frame.right, frame.world_from_camera if self._odometry_options is not None else None, frame.starts_anew
+            return
+        first: Tuple[int, ...] = ()
+        for number, pair in enumerate(self._source):  # type: ignore[arg-type]
+            if not isinstance(pair, (tuple, list)) or len(pair) != 2:
+                raise _egosgm.InvalidArgument(f"pair {number}: is a {type(pair).__name__}: give (left, right), each an image")
+            left, right = (np.array(image) for image in pair)  # copies: a camera may use its buffers again before the frame is handed out
+            if not first and left.ndim >= 2 and os.path.isfile(self._calibration_file):
+                read_calibration(self._calibration_file, size=left.shape[1::-1])  # refused where it is of another size
+            first = first or left.shape[:2]
+            if left.shape[:2] != first:
+                raise _egosgm.InvalidArgument(f"pair {number}: its left image is of the shape {left.shape}, and the first one's began with {first}: "
+                                              "all need one size")
+            yield left, right, None, False
 
     def _pipeline(self, width: int, height: int) -> _egosgm.Pipeline:
         """Without a calibration, nothing is predicted: any one does."""
         calibration = self.calibration or _egosgm.Calibration(width, width, width / 2, height / 2, 1)
         return _egosgm.Pipeline(calibration, width, height, **self._options)
 
-    def _tell(self, *doubts: str) -> None:
-        text = "; ".join(filter(None, doubts))
-        if text:
-            warnings.warn(f"{text}: `egosgm doctor` tells why", UserWarning, stacklevel=4)
+    def _tell(self, text: str) -> None:
+        warnings.warn(text, UserWarning, stacklevel=4)
 
     def _frames(self) -> Iterator[DriveFrame]:
-        """The device matches a frame while the next one is read and its motion is found. Iterations share nothing, so that each may end
-        where it likes, and two may run at once."""
-        motions, pipeline = self._motions(), None
+        """Iterations share nothing, so that each may end where it likes, and two may run at once. The loop is C++'s (vision/stereo_video.h)."""
+        pipeline, video, failure = None, None, None
+        pairs = self._pairs() if self.sequence is None else iter(())
+        first = list(itertools.islice(pairs, 1))
+        if self.sequence is None and not first:
+            return
+        pairs = itertools.chain(first, pairs)
+        size = self._size or _egosgm._size_of_image(first[0][0])
         with contextlib.suppress(IndexError):  # none is left, or another thread was quicker
             pipeline = self._spare.pop()
-        pairs, under_way, failure, doubt = self._pairs(), None, None, None
         try:
+            pipeline = pipeline or self._pipeline(*size)
+            video = _egosgm._Video(pipeline, *size, self.calibration, self.sequence, self._outputs, self._lag, self._odometry_options is not None,
+                                   **(self._odometry_options or {}))
             while True:
-                next_one = None
-                try:
-                    for number, name, left, right, pose, starts_anew in pairs:
-                        found = motions.next(left, right, pose, starts_anew)
-                        if pipeline is None:
-                            pipeline = self._pipeline(*np.shape(left)[1::-1])
-                        next_one = number, name, left, right, found
-                        if not starts_anew:
-                            pipeline.submit(left, right, found.motion, self._outputs)
-                        break
-                except Exception as error:  # what is under way does not suffer from a next frame that is none
-                    failure = error
-                if under_way and (failure is None or pipeline.under_way):
-                    number, name, left, right, found = under_way
-                    maps = pipeline.collect()
-                    if doubt is None:
-                        options = pipeline.options
-                        doubt = _egosgm._Doubt(self.calibration, options["min_disparity"], options["disparities"])
-                    doubt.add(left, right, maps.report, found.motion is not None or self._odometry_options is None)
-                    odometry = None if self._odometry_options is None else found.odometry
-                    yield DriveFrame(number, name, left, right, maps, odometry, found.motion, self.calibration)
-                if failure:
-                    raise failure
-                under_way = next_one
-                if under_way is None:
-                    self._tell(doubt.text() if doubt else "", motions.doubt(), self._source.gaps.text() if isinstance(self._source, Bag) else "")
-                    return
-                if starts_anew:
-                    pipeline.reset()
-                    pipeline.submit(left, right, under_way[4].motion, self._outputs)
+                while video.wants_pair:
+                    try:
+                        video.add(*next(pairs))
+                    except StopIteration:
+                        video.end()
+                    except Exception as error:  # what is under way does not suffer from a next pair that is none
+                        failure = error
+                        video.end()
+                found = video.next()
+                if found is None:
+                    break
+                left_out, number, name, images, maps, odometry, motion = found
+                if left_out:
+                    self._tell(f"frame {name}: left out: {left_out}")
+                    continue
+                yield DriveFrame(number, name, *images, maps, None if self._odometry_options is None else odometry, motion, self.calibration)
+            if failure:
+                raise failure
+            doubts = "; ".join(filter(None, (*video.doubts(), self._source.gaps.text() if isinstance(self._source, Bag) else "")))
+            if doubts:
+                self._tell(f"{doubts}: `egosgm doctor` tells why")
         finally:
-            while pipeline and pipeline.under_way:
-                pipeline.collect()
+            if video:
+                video.close()
             if pipeline:
                 pipeline.reset()
                 self._spare = [pipeline]
@@ -229,7 +214,7 @@ def _bar(progress: Optional[bool]):
 
 def run(source: Union[str, "os.PathLike[str]", _egosgm.StereoSequence, Bag, Iterable[Tuple[NDArray[Any], NDArray[Any]]]],
         calibration: "_egosgm.Calibration | str | os.PathLike[str] | None" = None, *, frames: str = "", motion: bool = True,
-        outputs: Union[str, Sequence[str]] = ("disparity", "variance"), odometry: Optional[Dict[str, Any]] = None,
+        outputs: Union[str, Sequence[str]] = ("disparity", "variance"), odometry: Optional[Dict[str, Any]] = None, lag: int = 1,
         progress: Optional[bool] = None, **options: Any) -> Drive:
     """Disparity and variance for each frame of a drive:
 
@@ -240,7 +225,8 @@ def run(source: Union[str, "os.PathLike[str]", _egosgm.StereoSequence, Bag, Iter
     calibration: a Calibration, or a file as read_calibration takes it; without any there are disparities, but no depth and
     no odometry.
     frames: "7:10" of a folder. motion=False: no odometry, so nothing is predicted. outputs: names of maps, found in
-    `frame.maps`. odometry: options of StereoOdometry. progress: a bar by tqdm; None: where somebody looks.
+    `frame.maps`. odometry: options of StereoOdometry. lag: 1, the device matches a frame while the next pair is asked for; 0, for a
+    live camera: a frame comes before the next pair is asked for. progress: a bar by tqdm; None: where somebody looks.
     All else is for Pipeline: device, preset and its options.
     """
-    return Drive(source, calibration, frames=frames, motion=motion, outputs=outputs, odometry=odometry, progress=progress, **options)
+    return Drive(source, calibration, frames=frames, motion=motion, outputs=outputs, odometry=odometry, lag=lag, progress=progress, **options)

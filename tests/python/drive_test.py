@@ -100,6 +100,26 @@ def test_pairs_of_an_iterator_come_once(street, frames):
         list(drive)
 
 
+def test_a_frame_comes_before_or_after_the_next_pair_is_asked_for(street, frames):
+    events, maps = [], {}
+
+    def camera():
+        for number, frame in enumerate(frames):
+            events.append(f"pair {number}")
+            yield frame.left, frame.right
+
+    for lag, expected in ((0, "pair 0, frame 0, pair 1, frame 1, pair 2, frame 2"), (1, "pair 0, pair 1, frame 0, pair 2, frame 1, frame 2")):
+        events.clear()
+        maps[lag] = []
+        for frame in egosgm.run(camera(), street.calibration, lag=lag, **OPTIONS):
+            events.append(f"frame {frame.number}")
+            maps[lag].append(frame.disparity)
+        assert ", ".join(events) == expected
+    np.testing.assert_array_equal(maps[0], maps[1])
+    with pytest.raises(egosgm.InvalidArgument, match="lag=2: choose 1.* or 0"):
+        egosgm.run([], lag=2)
+
+
 def test_the_last_good_frame_comes_before_the_error(street, frames):
     pairs = [(frame.left, frame.right) for frame in frames]
     broken = [*pairs[:2], (pairs[2][0], pairs[2][1][:9])]
