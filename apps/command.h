@@ -20,8 +20,10 @@ struct Command {
   std::function<int()> run;
 };
 
-/// What the Python package does for a run. Without it, the program becomes the package's where that is asked for.
+/// What the Python package does for a run.
 struct Package {
+  /// Makes this process the package's, for `why`; empty in the package. Does not return.
+  std::function<void(const std::string& why)> take_over;
   /// The frames of a bag that lie in `range`, of a run that writes to `out`.
   std::function<std::shared_ptr<vision::FrameSource>(const BagArguments& bag, const std::string& calib,
                                                      vision::FrameRange range, const std::string& out)>

@@ -122,7 +122,12 @@ int parse_and_run(int argc, const char* const* argv, const Package* package) {
       "  egosgm eval --estimate result --truth street/truth/left_disp_noc\n"
       "Exit codes: 0 done, 1 the device, the disk or the program failed, 2 wrong arguments or input, 130 interrupted.\n"
       "Who stops reading the output (`| head`) ends the printing, not the work.");
-  const Package hooks = package ? *package : Package();
+  const auto take_over = [&](const std::string& why) { become_python(argc, argv, why); };
+  const auto read_calibration = [&](const auto&, const auto&,
+                                    const std::string& why_not) -> std::optional<Calibration> {
+    become_python(argc, argv, why_not);
+  };
+  const Package hooks = package ? *package : Package{take_over, {}, read_calibration, {}};
   const Command commands[] = {
       add_run(program, hooks),      add_eval(program),    add_devices(program), add_synth(program),
       add_odometry(program, hooks), add_compile(program), add_tune(program)};

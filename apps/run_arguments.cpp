@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "apps/device_arguments.h"
@@ -13,6 +14,7 @@
 #include "apps/run_outputs.h"
 #include "apps/tuning_file.h"
 #include "egosgm/error.h"
+#include "vision/file_kinds.h"
 #include "vision/frame_panels.h"
 #include "vision/motion_source.h"
 
@@ -98,6 +100,11 @@ void RunArguments::add_to(CLI::App& command) {
 }
 
 SequenceJob RunArguments::job(const Package& package) const {
+  if (bag.bag.empty() && vision::is_bag(input.folder)) {
+    RunArguments of_bag = *this;
+    of_bag.bag.bag = std::exchange(of_bag.input.folder, "");
+    return of_bag.job(package);
+  }
   SequenceJob job;
   if (out.empty() && !rerun) throw InvalidArgument("--out is required: see `egosgm run --help`");
   job.options = method.options();
@@ -110,6 +117,13 @@ SequenceJob RunArguments::job(const Package& package) const {
   if (!job.kinds.contains("cloud") && cloud_sigma_percent != RunArguments().cloud_sigma_percent) {
     throw InvalidArgument(
         fmt::format("--cloud-sigma {:g}: is of clouds: give --write cloud, too", cloud_sigma_percent));
+  }
+  if (const std::string option = bag.option_without_bag(); !option.empty()) {
+    throw InvalidArgument(option + ": is of a bag: give --bag BAG with it");
+  }
+  if (package.take_over) {
+    const std::string why = rerun ? "--rerun" : has_recording() ? "--out " + out : bag.bag;
+    if (!why.empty()) package.take_over(why);
   }
   job.source = source_of(*this, package);
   job.input = bag.bag.empty() ? input.text() : bag.text();

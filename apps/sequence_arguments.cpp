@@ -9,6 +9,7 @@
 #include "apps/option_group.h"
 #include "egosgm/error.h"
 #include "egosgm/vision/calibration_io.h"
+#include "vision/file_kinds.h"
 #include "vision/folder_contents.h"
 
 namespace egosgm::app {
@@ -124,17 +125,20 @@ vision::StereoSequence SequenceArguments::open(bool needs_calibration, const Cal
 vision::StereoSequence SequenceArguments::open_pictures(const vision::FrameRange& range,
                                                         const CalibrationReader& read) const {
   const vision::PairBy pairing = parse_pair_by(pair_by);
+  std::string why_not;
   try {
     return vision::open_patterns(left, right, calib, range, pairing);
   } catch (const vision::NegativeBaseline&) {
     throw;
-  } catch (const InvalidArgument&) {
-    std::error_code error;
-    const bool is_stream = std::filesystem::is_fifo(calib, error) || std::filesystem::is_character_file(calib, error);
+  } catch (const InvalidArgument& error) {
+    std::error_code none;
+    const bool is_stream = std::filesystem::is_fifo(calib, none) || std::filesystem::is_character_file(calib, none);
     if (calib.empty() || !read || is_stream) throw;  // a pipe can be read once
+    if (!std::filesystem::exists(calib, none) || vision::is_own_calibration(calib)) throw;
+    why_not = error.what();
   }
   vision::StereoSequence sequence = vision::open_patterns(left, right, "", range, pairing);
-  const std::optional<Calibration> found = read(calib, vision::check_image_sizes(sequence));
+  const std::optional<Calibration> found = read(calib, vision::check_image_sizes(sequence), why_not);
   sequence.has_calibration = found.has_value();
   if (found) sequence.calibration = *found;
   return sequence;
@@ -184,10 +188,9 @@ std::string SequenceArguments::text() const {
 
 void BagArguments::add_to(CLI::App& command) {
   OptionGroup options(command, "Bags, by the Python package with its extra \"bag\"");
-  CLI::Option* const of_bag =
-      options.add("--bag", bag, "BAG", "ROS 2 (MCAP, SQLite) or ROS 1: a .mcap, a .bag, or a bag's folder");
+  options.add("--bag", bag, "BAG", "ROS 2 (MCAP, SQLite) or ROS 1: a .mcap, a .bag, or a bag's folder");
   const auto add = [&](const char* name, auto& value, const char* text, const char* type) {
-    return options.add(name, value, type, text)->needs(of_bag);
+    return others_.emplace_back(options.add(name, value, type, text));
   };
   add("--left-topic", left_topic, "raw or compressed images [where names tell, and there is one choice, that one]",
       "TOPIC");
@@ -199,6 +202,13 @@ void BagArguments::add_to(CLI::App& command) {
   add("--max-skew-ms", max_skew_ms, "how far the stamps of a pair may differ [0]", "MS");
   add("--rectify", rectify,
       "images by their infos [auto: where the infos have a distortion and the topic is not named rect]", "auto|on|off");
+}
+
+std::string BagArguments::option_without_bag() const {
+  if (!bag.empty()) return {};
+  const auto given =
+      std::find_if(others_.begin(), others_.end(), [](const auto* option) { return option->count() > 0; });
+  return given == others_.end() ? "" : (*given)->get_name();
 }
 
 std::string BagArguments::text() const {

@@ -12,9 +12,10 @@
 
 namespace egosgm::app {
 
-/// Reads the calibration of a file that this library does not, for images of `size`; none where it is of raw images,
-/// which the caller rectifies. Throws InvalidArgument.
-using CalibrationReader = std::function<std::optional<Calibration>(const std::string& file, vision::Size size)>;
+/// Reads the calibration of a file that this library does not, for `why_not`, and images of `size`; none where it is of
+/// raw images, which the caller rectifies. Throws InvalidArgument.
+using CalibrationReader =
+    std::function<std::optional<Calibration>(const std::string& file, vision::Size size, const std::string& why_not)>;
 
 /// The arguments that say which stereo sequence to read.
 struct SequenceArguments {
@@ -37,8 +38,13 @@ struct BagArguments {
   std::vector<std::string> info_topics;
 
   void add_to(CLI::App& command);
+  /// An option of a bag that was given without one; else empty.
+  std::string option_without_bag() const;
   /// As SequenceArguments::text.
   std::string text() const;
+
+ private:
+  std::vector<CLI::Option*> others_;  // than --bag
 };
 
 /// Adds --poses, --max-translation and --max-rotation to the group "Method".

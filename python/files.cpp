@@ -12,6 +12,7 @@
 #include "python/bindings.h"
 #include "python/pickling.h"
 #include "vision/file_io.h"
+#include "vision/file_kinds.h"
 #include "vision/frame_panels.h"
 #include "vision/image_pairs.h"
 
@@ -240,6 +241,8 @@ void bind_files(py::module_& module) {
       "_read_stored_image", [](const path& file) { return array_of(vision::read_stored_image(file)); },
       py::arg("file"));
   module.def("_expect_writable", &vision::expect_writable, py::arg("file"));
+  module.def("_is_bag", &vision::is_bag, py::arg("path"));
+  module.def("_is_own_calibration", &vision::is_own_calibration, py::arg("file"));
   module.def("_is_stream", &vision::is_stream, py::arg("file"));
   module.def(
       "_read_calibration",

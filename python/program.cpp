@@ -174,7 +174,7 @@ class Outputs : public app::FrameSink {
 
 /// `read` outlives it: who copies it need not hold the interpreter's lock.
 app::CalibrationReader reader_of(const py::object& read) {
-  return [&read](const std::string& file, vision::Size size) {
+  return [&read](const std::string& file, vision::Size size, const std::string&) {
     return in_python([&] {
       const py::object found = read(std::filesystem::path(file), py::make_tuple(size.width, size.height));
       return found.cast<std::optional<Calibration>>();

@@ -181,7 +181,7 @@ def _found(file: pathlib.Path, is_fisheye: bool, size: Optional[Tuple[int, int]]
     plain = formats.foundation_stereo(text, file)
     if plain is not None:
         return plain
-    is_own = re.search(r"(?m)^\s*(P_rect_\d|P[0-3]\s*:(?!\s*!!)|cam0\s*=|baseline_m\b)", text) and not text.startswith("%YAML")
+    is_own = _egosgm._is_own_calibration(file)
     if is_own or file.suffix.lower() not in (".yaml", ".yml", ".json", ".xml", ".txt", ".conf", ".cfg", ".gz", ""):
         raise own_error
     data = parts.data_of(text, file)

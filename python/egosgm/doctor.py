@@ -251,6 +251,10 @@ def _parser() -> Parser:
 
 def main(arguments: Sequence[str]) -> int:
     given = _parser().parse(arguments)
+    for name in ("DATASET", "dataset"):
+        if not given.bag and _egosgm._is_bag(getattr(given, name) or ""):
+            given.bag = getattr(given, name)
+            setattr(given, name, None)
     _egosgm._check_range(given.disparities, given.min_disparity)
     if given.samples < 1:
         raise _egosgm.InvalidArgument(f"--samples {given.samples}: choose a number above 0")

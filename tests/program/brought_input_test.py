@@ -3,11 +3,13 @@
 import json
 import re
 import shutil
+import subprocess
+import unittest
 
 import numpy
 
 from input_case import InputTest, read_grey, write_grey
-from program_case import FRAMES, HEIGHT, WIDTH, egosgm, png
+from program_case import FRAMES, HAS_PACKAGE, HEIGHT, WIDTH, egosgm, png
 
 
 class Brought(InputTest):
@@ -223,10 +225,31 @@ class KnownFormats(Brought):
                  "ORB-SLAM": "%YAML:1.0\nCamera.fx: 460.0\n", "DSEC": "disparity_to_depth:\n  cams_12:\n  - [1.0]\n",
                  "Cityscapes": '{"extrinsic": {"baseline": 0.3}, "intrinsic": {"fx": 460, "u0": 319.5}}',
                  "K.txt": "460.0 0.0 319.5 0.0 460.0 239.5 0.0 0.0 1.0\n0.3\n", "JSON": '{"a": 1}', "OpenCV's stereo calibration": '{"K1": [[1]], "K2": [[1]]}'}
+        program, environment = self.without_package()
         for named, text in texts.items():
             file = self.new_folder() / "calib.yaml"
             file.write_text(text)
-            self.assert_refused(["run", *self.with_calibration(file), "--out", self.new_folder() / "out"], named, "EgoSGM's formats")
+            done = subprocess.run([program, "run", *map(str, self.with_calibration(file)), "--out", file.parent / "out"], env=environment,
+                                  capture_output=True, text=True, timeout=900)
+            if "needs the Python package" not in done.stderr:
+                self.skipTest("the package is installed here")
+            self.assertRegex(done.stderr, r"^egosgm: error: run: [^\n]*EgoSGM's formats[^\n]*pip install[^\n]*\n$")
+            self.assertIn(named, done.stderr)
+
+    @unittest.skipUnless(HAS_PACKAGE, "built without the Python package")
+    def test_run_and_odometry_read_what_the_package_reads(self):
+        f, cx, cy, baseline = self.calibration()
+        folder, own = self.new_folder(), self.calibrated()
+        file = folder / "K.txt"
+        file.write_text(f"{f} 0 {cx} 0 {f} {cy} 0 0 1\n{baseline}\n")
+        for calib, name in ((own, "own"), (file, "other")):
+            self.assert_works("run", *self.with_calibration(calib), "--frames", ":1", "--disparities", 16, "--out", folder / name)
+            self.assert_works("odometry", *self.with_calibration(calib), "--frames", ":1", "--out", folder / f"{name}.txt")
+        self.assertEqual(self.report(folder / "other")["calibration"], self.report(folder / "own")["calibration"])
+        for name in ("{}/disparity/000001.png", "{}/poses.txt", "{}.txt"):
+            self.assertEqual((folder / name.format("other")).read_bytes(), (folder / name.format("own")).read_bytes())
+        own.write_text(own.read_text().replace("baseline_m", "baseline_m = 1\nbase"))  # of a format that is known: the program itself says it
+        self.assert_refused(["run", *self.with_calibration(own), "--out", folder / "never"], own, "unknown key 'base'")
 
     def test_nested_lists_and_units_of_opencv(self):
         f, cx, cy, baseline = self.calibration()

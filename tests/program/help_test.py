@@ -3,7 +3,6 @@
 import json
 import os
 import pathlib
-import re
 import shutil
 import subprocess
 import sys
@@ -54,13 +53,10 @@ class Help(ProgramTest):
 
     def test_a_tool_in_python_names_the_package_where_it_is_not_there(self):
         """By a copy of the program, beside which there is none."""
-        loaded = subprocess.run([PROGRAM], env={**os.environ, "LD_TRACE_LOADED_OBJECTS": "1"}, capture_output=True, text=True, check=True).stdout
-        folders = {os.path.dirname(path) for path in re.findall(r"=> (/\S*libegosgm\S*)", loaded)}
-        folder = self.new_folder()
-        copy = shutil.copy(PROGRAM, folder / "egosgm")
+        folder, (copy, environment) = self.new_folder(), self.without_package()
         for path, code, named in ((str(folder), 1, "python3 cannot be started"), (os.environ["PATH"], 1, "needs the Python package egosgm, which")):
             done = subprocess.run([copy, "run", "--bag", "drive.mcap", "--out", folder / "out"], capture_output=True, text=True, timeout=900,
-                                  env={"PATH": path, "LD_LIBRARY_PATH": ":".join(folders), "PYTHONNOUSERSITE": "1"})
+                                  env={**environment, "PATH": path})
             if path != str(folder) and "drive.mcap" in done.stderr.split("egosgm")[-1]:
                 self.skipTest("the package is installed here")
             self.assertEqual(done.returncode, code, done.stderr)

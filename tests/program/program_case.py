@@ -10,6 +10,7 @@ import io
 import json
 import os
 import pathlib
+import re
 import shutil
 import struct
 import subprocess
@@ -122,6 +123,13 @@ class ProgramTest(unittest.TestCase):
         copy = self.new_folder() / "street"
         shutil.copytree(self.street, copy)
         return copy
+
+    def without_package(self):
+        """A copy of the program beside which there is no package, and the environment that it runs in."""
+        loaded = subprocess.run([PROGRAM], env={**os.environ, "LD_TRACE_LOADED_OBJECTS": "1"}, capture_output=True, text=True, check=True).stdout
+        folders = {os.path.dirname(path) for path in re.findall(r"=> (/\S*libegosgm\S*)", loaded)}
+        environment = {"PATH": os.environ["PATH"], "LD_LIBRARY_PATH": ":".join(folders), "PYTHONNOUSERSITE": "1"}
+        return shutil.copy(PROGRAM, self.new_folder() / "egosgm"), environment
 
     def started(self, *words, lines=1, stderr=subprocess.PIPE, command=(PROGRAM,), **options):
         """A command that has printed so many lines and waits to be read before it goes on, however busy the machine is."""

@@ -1197,6 +1197,24 @@ def examined(capfd, path, *arguments):
     return findings
 
 
+def test_a_bag_is_known_without_its_option(tmp_path, street, frames, capfd):
+    from egosgm import doctor
+    file, folder = record("mcap", tmp_path / "mcap", street, frames), record("sqlite", tmp_path / "sqlite", street, frames)
+    for bag, out in ((file, "file"), (folder, "folder")):
+        assert program(bag, *TOPICS, *SET, "--frames", ":1", "--out", tmp_path / out).returncode == 0
+        assert json.loads((tmp_path / out / "report.json").read_text())["input"] == f"bag {bag.name}"
+        doctor.main([str(bag), "--json"])
+        assert '"check": "rows"' in capfd.readouterr().out
+    assert egosgm._egosgm._is_bag(tmp_path / "drive.bag.zstd") and not egosgm._egosgm._is_bag(tmp_path)
+    (tmp_path / "parts").mkdir()
+    file.rename(tmp_path / "parts/part_0.mcap")
+    assert egosgm._egosgm._is_bag(tmp_path / "parts")
+    (tmp_path / "parts/left").mkdir()  # images, and the bag that they came from
+    assert not egosgm._egosgm._is_bag(tmp_path / "parts")
+    for option in (["--left-topic", "/left"], ["--pose-axes", "body"]):
+        refused(capfd, [tmp_path, *option, "--out", tmp_path / "never"], f"{option[0]}: is of a bag")
+
+
 def test_doctor_looks_at_bags(tmp_path, street, frames, capfd):
     pytest.importorskip("cv2")
     findings = examined(capfd, record("mcap", tmp_path / "good", street, frames))
