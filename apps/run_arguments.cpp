@@ -74,7 +74,7 @@ void RunArguments::add_to(CLI::App& command) {
              "new or empty folder to write: disparity/NNNNNN.png (KITTI's format; .pfm where that has no room for "
              "the range), poses.txt, report.json. With the Python package also FILE.rrd, for the viewer Rerun, and of "
              "a bag FILE.mcap, for ROS 2");
-  output.add("--write", write, "LIST", kWriteListHelp);
+  output.add("--write", write, "LIST", write_list_help());
   output.add(
       "--cloud-sigma", cloud_sigma_percent, "PERCENT",
       fmt::format("--write cloud leaves out depths whose standard deviation is larger than this [% of the depth, {:g}]",

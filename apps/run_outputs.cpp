@@ -17,18 +17,25 @@
 #include "egosgm/vision/image_io.h"
 #include "egosgm/vision/point_cloud.h"
 #include "egosgm/vision/render.h"
+#include "host/frame_outputs.h"
 #include "vision/file_io.h"
 
 namespace egosgm::app {
 namespace {
 
-const std::vector<std::string> kKinds{
-    "variance", "color",   "predicted", "measured", "right",    "interpolated", "interpolated_certain",
-    "search",   "dynamic", "reason",    "pfm",      "overview", "cloud",        "depth",
-    "depth_m",  "left"};
+/// What is made of a frame's maps. Outputs that are written as they are stand in the table of outputs.
+const std::vector<std::string> kMade{
+    "color", "interpolated", "interpolated_certain", "pfm", "overview", "cloud", "depth", "depth_m", "left"};
 
-const std::set<std::string> kDisparities{"disparity", "predicted",    "measured",
-                                         "right",     "interpolated", "interpolated_certain"};
+/// All that `--write` takes.
+std::vector<std::string> kinds_to_write() {
+  std::vector<std::string> kinds;
+  for (const OutputText& text : output_texts()) {
+    if (*text.written && text.output != Output::kDisparity) kinds.emplace_back(text.written);  // that is always written
+  }
+  kinds.insert(kinds.end(), kMade.begin(), kMade.end());
+  return kinds;
+}
 
 /// KITTI's PNG has values above 0 and below 256 px.
 bool fits_png(const PipelineOptions& options) {
@@ -36,46 +43,56 @@ bool fits_png(const PipelineOptions& options) {
 }
 
 const char* extension_of(const std::string& kind, const PipelineOptions& options) {
-  if (kind == "variance" || kind == "pfm" || kind == "depth_m") return ".pfm";
-  if (kDisparities.contains(kind) && !fits_png(options)) return ".pfm";
+  bool is_disparity = kind.starts_with("interpolated"), is_float = is_disparity || kind == "pfm" || kind == "depth_m";
+  for (const OutputText& text : output_texts()) {
+    if (kind != text.written) continue;
+    is_disparity = text.unit == std::string("px");
+    is_float = text.values == std::string("float32");
+  }
+  if (is_float && !(is_disparity && fits_png(options))) return ".pfm";
   return kind == "cloud" ? ".ply" : ".png";
-}
-
-template <typename T>
-MapView<T> view_of(vision::Image& map) {
-  return {map.row<T>(0), map.cols, map.rows, static_cast<std::ptrdiff_t>(map.stride_bytes)};
 }
 
 }  // namespace
 
-const char* const kWriteListHelp =
-    "more to write, separated by commas:\n"
-    "  variance       variance [px^2], PFM\n"
-    "  pfm            disparity as float, PFM: also negative ones and those above 256\n"
-    "  right, predicted, measured, interpolated\n"
-    "                 these disparity maps, in the format of OUT/disparity\n"
-    "  interpolated_certain\n"
-    "                 the same, but variances above 6 px^2 become holes before they are filled: of a video a little "
-    "better\n"
-    "  search         disparities searched at each pixel, 16-bit PNG\n"
-    "  dynamic        255 where prediction and measurement contradict each other, as on what moves by itself, 8-bit "
-    "PNG\n"
-    "  reason         why a pixel has no value, or a doubtful one: a number each, 8-bit PNG (docs/use/formats.md)\n"
-    "  color          disparity in colours, PNG\n"
-    "  overview       image, disparity, search width and error (or variance) in one PNG\n"
-    "  cloud          points with colours [m], PLY, without those whose depth is uncertain (--cloud-sigma)\n"
-    "  depth, depth_m depth in millimetres, 16-bit PNG, 0 where there is none or more than 65.535 m; in metres, PFM\n"
-    "  left           the left images as they are matched, grey PNG; always of a bag";
+std::string write_list_help() {
+  std::string help = "more to write, separated by commas:\n";
+  for (const OutputText& text : output_texts()) {
+    if (!*text.written || text.output == Output::kDisparity) continue;
+    const std::string unit = text.unit, values = text.values;
+    const std::string format = unit == "px"          ? "as OUT/disparity"
+                               : values == "float32" ? "PFM"
+                               : values == "uint16"  ? "16-bit PNG"
+                                                     : "8-bit PNG";
+    help +=
+        fmt::format("  {:<14} {}{}, {}\n", text.written, text.meaning, unit.empty() ? "" : " [" + unit + "]", format);
+  }
+  return help +
+         "  pfm            disparity as float, PFM: also negative ones and those above 256\n"
+         "  interpolated   the disparity with its holes filled, in the format of OUT/disparity\n"
+         "  interpolated_certain\n"
+         "                 the same, but variances above 6 px^2 become holes before they are filled: of a video a "
+         "little "
+         "better\n"
+         "  color          disparity in colours, PNG\n"
+         "  overview       image, disparity, search width and error (or variance) in one PNG\n"
+         "  cloud          points with colours [m], PLY, without those whose depth is uncertain (--cloud-sigma)\n"
+         "  depth, depth_m depth in millimetres, 16-bit PNG, 0 where there is none or more than 65.535 m; in metres, "
+         "PFM\n"
+         "  left           the left images as they are matched, grey PNG; always of a bag\n"
+         "What the numbers of reason and the formats mean: docs/use/formats.md";
+}
 
 std::set<std::string> parse_write_list(const std::string& list) {
   std::set<std::string> kinds;
+  const std::vector<std::string> known = kinds_to_write();
   std::istringstream stream(list);
   for (std::string part; std::getline(stream, part, ',');) {
     const std::string kind = CLI::detail::trim_copy(part);
     if (kind == "disparity") continue;  // always written
-    if (std::find(kKinds.begin(), kKinds.end(), kind) == kKinds.end()) {
+    if (std::find(known.begin(), known.end(), kind) == known.end()) {
       std::string all;
-      for (const std::string& known : kKinds) all += (all.empty() ? "" : ", ") + known;
+      for (const std::string& each : known) all += (all.empty() ? "" : ", ") + each;
       throw InvalidArgument(fmt::format("--write \"{}\": choose from {}", kind, all));
     }
     kinds.insert(kind);
@@ -106,71 +123,54 @@ RunOutputs::RunOutputs(std::filesystem::path folder, std::set<std::string> kinds
       options_(options),
       calibration_(calibration),
       cloud_(cloud),
-      disparity_(size, vision::kF32),
       panels_(options.disparities) {
   if (!folder_.empty()) {
     vision::make_folder(folder_ / "disparity");
     for (const std::string& kind : kinds_) vision::make_folder(folder_ / kind);
   }
-  if (wants("variance") || wants("overview") || wants("cloud") || wants("interpolated_certain"))
-    variance_.create(size, vision::kF32);
-  if (wants("right")) right_.create(size, vision::kF32);
-  if (wants("predicted")) predicted_.create(size, vision::kF32);
-  if (wants("measured")) measured_.create(size, vision::kF32);
-  if (wants("search") || wants("overview")) search_.create(size, vision::kU16);
-  if (wants("dynamic")) dynamic_.create(size, vision::kU8);
-  if (wants("reason")) reason_.create(size, vision::kU8);
+  Wanted wanted{Output::kDisparity};
+  for (const OutputText& text : output_texts()) {
+    if (wants(text.written)) wanted.add(text.output);
+  }
+  if (wants("overview") || wants("cloud") || wants("interpolated_certain")) wanted.add(Output::kVariance);
+  if (wants("overview")) wanted.add(Output::kSearchWidth);
+  make_maps(wanted);
 }
 
-void RunOutputs::make_shown_maps() {
-  variance_.create(size_, vision::kF32);
-  reason_.create(size_, vision::kU8);
-}
-
-FrameOutputs RunOutputs::views() {
-  FrameOutputs outputs;
-  outputs.disparity = vision::map_view(disparity_);
-  if (!variance_.empty()) outputs.variance = vision::map_view(variance_);
-  if (!right_.empty()) outputs.right_disparity = vision::map_view(right_);
-  if (!predicted_.empty()) outputs.debug.predicted = vision::map_view(predicted_);
-  if (!measured_.empty()) outputs.debug.measured = vision::map_view(measured_);
-  if (!search_.empty()) outputs.debug.search_width = view_of<std::uint16_t>(search_);
-  if (!dynamic_.empty()) outputs.debug.dynamic = view_of<std::uint8_t>(dynamic_);
-  if (!reason_.empty()) outputs.reason = view_of<std::uint8_t>(reason_);
-  return outputs;
+void RunOutputs::make_maps(const Wanted& wanted) {
+  for_each_output(outputs_, [&]<typename T>(const OutputText& text, MapView<T>& view) {
+    if (!wanted.has(text.output)) return;
+    vision::Image& map = maps_[static_cast<std::size_t>(text.output)];
+    map.create(size_, std::is_same_v<T, float> ? vision::kF32 : sizeof(T) == 2 ? vision::kU16 : vision::kU8);
+    view = {map.row<T>(0), map.cols, map.rows, static_cast<std::ptrdiff_t>(map.stride_bytes)};
+  });
 }
 
 WrittenFrame RunOutputs::write(const vision::StereoFrame& frame, const vision::Image& left) {
   using Path = std::filesystem::path;
   WrittenFrame written;
-  const auto depth_m = [&] { return vision::depth_from_disparity(disparity_, calibration_); };
+  const vision::Image &disparity = map(Output::kDisparity), &variance = map(Output::kVariance);
+  const auto depth_m = [&] { return vision::depth_from_disparity(disparity, calibration_); };
   const std::pair<const char*, std::function<void(const Path&)>> writers[] = {
       {"left",
        [&](const Path& path) { vision::write_png(path, left); }},  // first: a cloud takes its colours from there
-      {"variance", [&](const Path& path) { vision::write_pfm(path, variance_); }},
-      {"pfm", [&](const Path& path) { vision::write_pfm(path, disparity_); }},
-      {"predicted", [&](const Path& path) { vision::write_disparity(path, predicted_); }},
-      {"measured", [&](const Path& path) { vision::write_disparity(path, measured_); }},
-      {"right", [&](const Path& path) { vision::write_disparity(path, right_); }},
-      {"search", [&](const Path& path) { vision::write_png(path, search_); }},
-      {"dynamic", [&](const Path& path) { vision::write_png(path, dynamic_); }},
-      {"reason", [&](const Path& path) { vision::write_png(path, reason_); }},
+      {"pfm", [&](const Path& path) { vision::write_pfm(path, disparity); }},
       {"overview",
        [&](const Path& path) {
-         vision::write_png(path, panels_.overview({frame, left, disparity_, variance_, search_}));
+         vision::write_png(path, panels_.overview({frame, left, disparity, variance, map(Output::kSearchWidth)}));
        }},
       {"interpolated",
-       [&](const Path& path) { vision::write_disparity(path, vision::interpolate_background(disparity_)); }},
+       [&](const Path& path) { vision::write_disparity(path, vision::interpolate_background(disparity)); }},
       {"interpolated_certain",
        [&](const Path& path) {
-         const vision::Image certain = vision::drop_uncertain(disparity_, variance_);
+         const vision::Image certain = vision::drop_uncertain(disparity, variance);
          vision::write_disparity(path, vision::interpolate_background(certain));
        }},
-      {"color", [&](const Path& path) { vision::write_png(path, panels_.disparity(disparity_)); }},
+      {"color", [&](const Path& path) { vision::write_png(path, panels_.disparity(disparity)); }},
       {"cloud",
        [&](const Path& path) {
          const vision::Image colors = vision::read_color_image(frame.left);
-         const vision::PointCloud cloud = vision::point_cloud(disparity_, variance_, colors, calibration_, cloud_);
+         const vision::PointCloud cloud = vision::point_cloud(disparity, variance, colors, calibration_, cloud_);
          vision::write_ply(path, cloud);
          written.cloud = {static_cast<std::int64_t>(cloud.points_m.size()), cloud.left_out};
        }},
@@ -180,11 +180,21 @@ WrittenFrame RunOutputs::write(const vision::StereoFrame& frame, const vision::I
          if (!wants("depth_m")) written.too_far = too_far;
        }},
       {"depth_m", [&](const Path& path) { vision::write_pfm(path, depth_m()); }}};
+  const auto file_of = [&](const char* kind) { return folder_ / output_file(kind, frame.name, options_); };
   for (const auto& [kind, write] : writers) {
-    if (wants(kind)) write(folder_ / output_file(kind, frame.name, options_));
+    if (wants(kind)) write(file_of(kind));
+  }
+  for (const OutputText& text : output_texts()) {
+    if (!wants(text.written)) continue;
+    const vision::Image& values = map(text.output);
+    if (values.type == vision::kF32) {
+      vision::write_disparity(file_of(text.written), values);
+    } else {
+      vision::write_png(file_of(text.written), values);
+    }
   }
   // Last: a frame with it is complete.
-  written.unstorable = vision::write_disparity(folder_ / output_file("disparity", frame.name, options_), disparity_);
+  written.unstorable = vision::write_disparity(file_of("disparity"), disparity);
   return written;
 }
 

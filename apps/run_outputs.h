@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -12,6 +13,7 @@
 #include "egosgm/pipeline.h"
 #include "egosgm/vision/image.h"
 #include "egosgm/vision/point_cloud.h"
+#include "host/frame_outputs.h"
 #include "vision/frame_panels.h"
 
 namespace egosgm::app {
@@ -24,7 +26,7 @@ std::string output_file(const std::string& kind, const std::string& frame, const
 std::vector<std::string> output_files(const std::set<std::string>& kinds, const vision::StereoSequence& sequence,
                                       const PipelineOptions& options);
 /// What parse_write_list takes, as --help describes it.
-extern const char* const kWriteListHelp;
+std::string write_list_help();
 
 /// How many points a frame's cloud has, and what it left out.
 struct CloudCounts {
@@ -46,17 +48,18 @@ class RunOutputs {
              const PipelineOptions& options, const Calibration& calibration, const vision::PointCloudOptions& cloud);
 
   /// Where the pipeline is to write; valid as long as this object lives.
-  FrameOutputs views();
+  const FrameOutputs& views() const { return outputs_; }
 
-  /// Those of a FrameSink, whatever is written.
-  void make_shown_maps();
-  ShownMaps shown() const { return {disparity_, variance_, reason_}; }
+  /// Makes these, too, whatever is written.
+  void make_maps(const Wanted& wanted);
+  ShownMaps shown() const { return {map(Output::kDisparity), map(Output::kVariance), map(Output::kReason)}; }
 
   /// Writes the frame that the views hold; `left` is its left image.
   WrittenFrame write(const vision::StereoFrame& frame, const vision::Image& left);
 
  private:
   bool wants(const char* kind) const { return kinds_.contains(kind); }
+  const vision::Image& map(Output output) const { return maps_[static_cast<std::size_t>(output)]; }
 
   const std::filesystem::path folder_;
   const vision::Size size_;
@@ -64,7 +67,8 @@ class RunOutputs {
   const PipelineOptions options_;
   const Calibration calibration_;
   const vision::PointCloudOptions cloud_;
-  vision::Image disparity_, variance_, right_, predicted_, measured_, search_, dynamic_, reason_;
+  std::array<vision::Image, kOutputCount> maps_;  // empty where it is not wanted
+  FrameOutputs outputs_;                          // views of them
   vision::FramePanels panels_;
 };
 

@@ -86,7 +86,7 @@ std::string StreetFrame::bits() const {
 
 const FrameTimes& StreetFrame::run(Belief& after, const Belief& before) {
   times_ = {};
-  const Plan plan = plan_of(options_, before.why_not, before.offset.is_known, motion_, {Views::kLeft, false, false});
+  const Plan plan = plan_of(options_, before.why_not, before.offset.is_known, motion_, {Output::kVariance});
   last_ = Clock::now();
   method_.frame(plan, images_, before, after, {disparity_, variance_});
   return times_;

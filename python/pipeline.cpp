@@ -9,7 +9,7 @@
 #include <mutex>
 
 #include "egosgm/named_options.h"
-#include "host/frame/frame_outputs.h"
+#include "host/frame_outputs.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
 #include "python/frame.h"
@@ -27,32 +27,21 @@ py::dict arrays_to_fill(const py::object& wanted, int width, int height) {
   }
   for (const py::handle& item : py::isinstance<py::str>(wanted) ? py::make_tuple(wanted) : py::tuple(wanted)) {
     const auto name = py::str(item).cast<std::string>();
-    if (name == "search_width") {
-      arrays[item] = py::array_t<std::uint16_t>({height, width});
-    } else if (name == "dynamic" || name == "reason") {
-      arrays[item] = py::array_t<std::uint8_t>({height, width});
-    } else {
-      arrays[item] = py::array_t<float>({height, width});
-    }
+    arrays[item] = py::array_t<float>({height, width});  // views_of refuses a name that no output has
+    FrameOutputs outputs;
+    for_each_output(outputs, [&]<typename T>(const OutputText& text, MapView<T>&) {
+      if (name == text.name) arrays[item] = py::array_t<T>({height, width});
+    });
   }
   return arrays;
 }
 
-namespace {
-
-template <typename T>
-MapView<T> view_of(const py::dict& arrays, const char* name, MapView<T>) {
-  return output_of<T>(arrays[name], name);
-}
-
-}  // namespace
-
 FrameOutputs views_of(const py::dict& arrays) {
   FrameOutputs outputs;
   std::vector<std::string> known;
-  for_each_output(outputs, [&](const char* name, auto& view) {
-    known.push_back(name);
-    if (arrays.contains(name)) view = view_of(arrays, name, view);
+  for_each_output(outputs, [&]<typename T>(const OutputText& text, MapView<T>& view) {
+    known.push_back(text.name);
+    if (arrays.contains(text.name)) view = output_of<T>(arrays[text.name], text.name);
   });
   for (const auto& [key, array] : arrays) {
     const auto name = py::str(key).cast<std::string>();
@@ -228,10 +217,13 @@ void bind_frame(py::module_& module) {
   auto frame = py::class_<Frame>(module, "Frame",
                                  "A frame's maps, H x W: disparities in pixels, variances in px^2, INVALID_DISPARITY "
                                  "(and variance 0) where there is no value. None where not asked for.");
-  FrameOutputs outputs;
-  for_each_output(outputs, [&](const char* name, auto&) {
-    frame.def_property_readonly(name, [name](const Frame& f) { return f.map(name); });
-  });
+  py::list texts;  // (name, type, meaning)
+  for (const OutputText& text : output_texts()) {
+    frame.def_property_readonly(
+        text.name, [name = text.name](const Frame& f) { return f.map(name); }, text.meaning);
+    texts.append(py::make_tuple(text.name, text.values, text.meaning));
+  }
+  module.attr("_OUTPUTS") = py::tuple(texts);
   frame.def_readonly("report", &Frame::report);
   pickle_members<&Frame::maps, &Frame::report>(frame);
 
@@ -249,19 +241,15 @@ void bind_pipeline(py::module_& module) {
   py::class_<LockedPipeline>(module, "Pipeline")
       .def(py::init(&make_pipeline), py::arg("calibration"), py::arg("width"), py::arg("height"), py::kw_only(),
            py::arg("device") = "", py::arg("preset") = "default", py::arg("cache") = "")
-      .def(
-          "process", &LockedPipeline::process, py::arg("left"), py::arg("right"), py::arg("motion") = py::none(),
-          py::arg("outputs") = py::make_tuple("disparity", "variance"),
-          "Matches one rectified pair.\n\n"
-          "left, right: H x W of uint8 or uint16, both alike; rows at any stride are read where they are.\n"
-          "motion: how the camera moved since the last frame, a Motion or a 4x4 matrix current_from_previous; None: "
-          "the whole range is searched.\n"
-          "outputs: names of the maps to make, or a dict of arrays to fill (float32; search_width: uint16, dynamic and "
-          "reason: uint8). Results: disparity, variance, reason, right_disparity, right_variance. For debugging, of "
-          "the "
-          "left view: predicted, predicted_variance, measured, measured_variance, search_width, dynamic.\n\n"
-          "Raises InvalidArgument before anything runs, or DeviceError. A frame that raises leaves the pipeline as "
-          "it was. Other Python threads run meanwhile; several that call one pipeline take turns.")
+      .def("process", &LockedPipeline::process, py::arg("left"), py::arg("right"), py::arg("motion") = py::none(),
+           py::arg("outputs") = py::make_tuple("disparity", "variance"),
+           "Matches one rectified pair.\n\n"
+           "left, right: H x W of uint8 or uint16, both alike; rows at any stride are read where they are.\n"
+           "motion: how the camera moved since the last frame, a Motion or a 4x4 matrix current_from_previous; None: "
+           "the whole range is searched.\n"
+           "outputs: names of the maps to make, or a dict of arrays to fill, of the types that Frame's maps have.\n\n"
+           "Raises InvalidArgument before anything runs, or DeviceError. A frame that raises leaves the pipeline as "
+           "it was. Other Python threads run meanwhile; several that call one pipeline take turns.")
       .def("submit", &LockedPipeline::submit, py::arg("left"), py::arg("right"), py::arg("motion") = py::none(),
            py::arg("outputs") = py::make_tuple("disparity", "variance"),
            "The first half of process: copies the images, starts the frame and returns, so that Python may read and "

@@ -73,11 +73,11 @@ TEST(Method, BuildsNothingInAFrame) {
   const Video video(standard(), 3);
   FrameTransfer transfer(built.context, kSize, {0, 32});
   Belief before(built.context, kSize), after(built.context, kSize);
+  const Wanted wanted{Output::kRightDisparity, Output::kRightVariance, Output::kDynamic};
   const int builds = built.context.builds();
   for (int index = 0; index < video.size(); ++index) {
     const ImageMemory left = video.image(index, EGOSGM_LEFT), right = video.image(index, EGOSGM_RIGHT);
-    const Plan plan =
-        plan_of(options(32, 0), before.why_not, before.offset.is_known, video.motion(index), {Views::kBoth, true});
+    const Plan plan = plan_of(options(32, 0), before.why_not, before.offset.is_known, video.motion(index), wanted);
     built.method.frame(plan, transfer.upload(left.view(), right.view()), before, after, transfer.given_out());
     built.context.wait();
     std::swap(before, after);

@@ -9,6 +9,7 @@
 #include <map>
 
 #include "egosgm/named_options.h"
+#include "host/frame_outputs.h"
 #include "host/method_options.h"
 #include "tests/support/expect_refused.h"
 
@@ -271,6 +272,18 @@ TEST(Options, ThePageSaysWhatTheTableSays) {
              defaults.at(text.name) + " | " + text.when_to_change + " |\n";
   }
   EXPECT_NE(page.find(table), std::string::npos) << "docs/use/options.md must hold:\n" << table;
+}
+
+// docs/use/formats.md has a row for every output, in the order of the table.
+TEST(Outputs, ThePageSaysWhatTheTableSays) {
+  std::ifstream file(EGOSGM_SOURCE_DIR "/docs/use/formats.md");
+  const std::string page{std::istreambuf_iterator<char>(file), {}};
+  std::string table;
+  for (const OutputText& text : output_texts()) {
+    table += std::string("| `") + text.name + "` | " + (*text.written ? "`" + std::string(text.written) + "`" : "") +
+             " | " + text.values + (*text.unit ? ", " + std::string(text.unit) : "") + " | " + text.meaning + " |\n";
+  }
+  EXPECT_NE(page.find(table), std::string::npos) << "docs/use/formats.md must hold:\n" << table;
 }
 
 TEST(Parameters, EachIsSetByItsNameAlone) {

@@ -90,9 +90,10 @@ TEST(Plan, HasACoarseMatchOnlyWhereItIsOn) {
 
 TEST(Plan, MakesOnlyWhatIsWanted) {
   const MethodOptions options;
-  EXPECT_EQ(plan_of(options, {}, true, {}, {Views::kBoth, true}).wanted.variance, Views::kBoth);
-  EXPECT_FALSE(plan_of(options, {}, true, {}, {{}, true}).wanted.variance);
-  EXPECT_TRUE(plan_of(options, {}, true, {}, {{}, true}).wanted.dynamic);
+  const Wanted wanted = plan_of(options, {}, true, {}, {Output::kRightVariance, Output::kDynamic}).wanted;
+  EXPECT_TRUE(wanted.has(Output::kRightVariance) && wanted.has(Output::kDynamic) && wanted.has_right());
+  EXPECT_FALSE(wanted.has(Output::kVariance) || wanted.has(Output::kReason) || wanted.has(Output::kDisparity));
+  EXPECT_TRUE(plan_of(options, {}, true, {}, {}).wanted.has_right()) << "where nothing is said";
 }
 
 }  // namespace

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "egosgm/error.h"
-#include "host/frame/frame_outputs.h"
+#include "host/frame_outputs.h"
 
 namespace egosgm {
 namespace {
@@ -66,7 +66,7 @@ void check_frame(shared::ImageSize size, const ImageView& left, const ImageView&
   check_image("right", right, size);
   if (left.type != right.type)
     throw InvalidArgument("left and right image differ in type: give both with 8 or both with 16 bits");
-  for_each_output(outputs, [&](const char* name, const auto& map) { check_map(name, map, size); });
+  for_each_output(outputs, [&](const OutputText& text, const auto& map) { check_map(text.name, map, size); });
 }
 
 }  // namespace egosgm

@@ -51,8 +51,9 @@ FrameImages images_on(const ocl::Context& context, const DeviceImages& images, s
 DevicePipeline::DevicePipeline(cl_command_queue queue, const Calibration& calibration, int width, int height,
                                const PipelineOptions& options, const std::string& programs)
     : pipeline_(calibration, width, height, options, device_on(queue, programs)) {
-  ocl::translated("DevicePipeline",
-                  [&] { pipeline_.impl_->prepare(PixelType::kU8, {.variance = Views::kBoth, .dynamic = true}); });
+  Wanted with_dynamic = kOnDevice;
+  with_dynamic.add(Output::kDynamic);
+  ocl::translated("DevicePipeline", [&] { pipeline_.impl_->prepare(PixelType::kU8, with_dynamic); });
 }
 
 DeviceMaps DevicePipeline::enqueue(const DeviceImages& images, const std::optional<Motion>& motion, cl_event* done,

@@ -40,15 +40,6 @@ MethodOptions method_of(const PipelineOptions& options, const Tuning& tuning) {
   return method;
 }
 
-Wanted wanted_of(const FrameOutputs& outputs) {
-  Wanted wanted{.dynamic = outputs.debug.dynamic.data != nullptr,
-                .right = outputs.right_disparity.data || outputs.right_variance.data,
-                .reasons = outputs.reason.data != nullptr};
-  if (outputs.variance.data) wanted.variance = Views::kLeft;
-  if (outputs.right_variance.data) wanted.variance = Views::kBoth;
-  return wanted;
-}
-
 FrameQueue::FrameQueue(const Calibration& calibration, shared::ImageSize size, const PipelineOptions& options,
                        const Device& device, PixelType type)
     : options_(options),
@@ -101,7 +92,7 @@ void FrameQueue::submit(const ImageView& left, const ImageView& right, const std
   if (Evidence::is_of(method_options_)) pack(left, right, *frame.after.images);
   const bool repeats = !belief_.images->empty() && *belief_.images == *frame.after.images;
   Plan plan = plan_of(method_options_, belief_.why_not, belief_.offset.is_known, motion, wanted, repeats);
-  if (wanted.reasons) plan.grey_step = levels_of(left, right).step();
+  if (wanted.has(Output::kReason)) plan.grey_step = levels_of(left, right).step();
   const FrameImages& images = frame.transfer->upload(left, right);
   if (under_way() > 0) context_.let_wait(ocl::Queue::kKernels, under_way_.back().transfer->scratch_fetched());
   const FrameResults results = method_.frame(plan, images, belief_, frame.after, frame.transfer->given_out());
@@ -114,8 +105,7 @@ void FrameQueue::submit(const ImageView& left, const ImageView& right, const std
                             .parts = {plan.matches, &method_.matcher().banded_sgm().stripes(),
                                       plan.has_coarse_match ? method_.search().coarse_cells() : 0, plan.right_row_step},
                             .offset = results.offset,
-                            .dynamic = plan.wanted.dynamic ? &workspace.dynamic : nullptr,
-                            .reasons = plan.wanted.reasons ? &workspace.reasons : nullptr},
+                            .published = workspace.published.maps(wanted)},
                            outputs);
   context_.flush();
 
@@ -135,8 +125,9 @@ DeviceMaps FrameQueue::enqueue(const FrameImages& images, const std::optional<Mo
   Belief after = free_memory();
   ocl::Drain drain{context_};
   release_results();
-  const Plan plan =
-      plan_of(method_options_, belief_.why_not, belief_.offset.is_known, motion, {Views::kBoth, wants_dynamic});
+  Wanted wanted = kOnDevice;
+  if (wants_dynamic) wanted.add(Output::kDynamic);
+  const Plan plan = plan_of(method_options_, belief_.why_not, belief_.offset.is_known, motion, wanted);
   after.images->clear();
   const StereoMaps result = method_.frame(plan, images, belief_, after, transfer.given_out()).given_out;
   const cl::Event end = done ? context_.end_of_recorded() : cl::Event();
@@ -152,7 +143,7 @@ DeviceMaps FrameQueue::enqueue(const FrameImages& images, const std::optional<Mo
   return {.disparity = result.disparity.get()(),
           .variance = result.variance.get()(),
           .unpredicted = plan.why_not,
-          .dynamic = plan.wanted.dynamic ? method_.workspace().dynamic.get()() : nullptr};
+          .dynamic = wants_dynamic ? method_.workspace().published.dynamic.get()() : nullptr};
 }
 
 FrameReport FrameQueue::collect() {

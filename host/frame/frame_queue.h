@@ -17,7 +17,8 @@ ocl::Context context_on(const Device::Handle& device);
 MethodOptions method_of(const PipelineOptions& options, const Tuning& tuning);
 
 /// The results that these outputs need.
-Wanted wanted_of(const FrameOutputs& outputs);
+/// Outputs that DevicePipeline always makes.
+inline const Wanted kOnDevice{Output::kDisparity, Output::kVariance, Output::kRightDisparity, Output::kRightVariance};
 
 /// Frames on their way: up to two at once, each on the belief that the one before leaves. One that fails takes those
 /// that rest on it along, and the belief goes back to what was before it.

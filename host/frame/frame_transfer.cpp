@@ -75,16 +75,21 @@ const FrameImages& FrameTransfer::upload(const ImageView& left, const ImageView&
   return images_;
 }
 
-template <typename T>
-void FrameTransfer::fetch(const ocl::Buffer<T>& buffer, std::size_t count, std::vector<T>& staged) {
-  staged.resize(count);
-  context_.queue(ocl::Queue::kDownload)
-      .enqueueReadBuffer(buffer.get(), CL_FALSE, 0, count * sizeof(T), staged.data(), nullptr, &scratch_fetched_);
+void FrameTransfer::fetch(const cl::Buffer& buffer, std::size_t bytes, void* to) {
+  context_.queue(ocl::Queue::kDownload).enqueueReadBuffer(buffer, CL_FALSE, 0, bytes, to, nullptr, &scratch_fetched_);
   context_.record(scratch_fetched_, "read", ocl::Queue::kDownload);
 }
 
-void FrameTransfer::fetch_left(const ocl::Buffer<float>& maps, bool wanted, Scratch& staged) {
-  if (wanted) fetch(maps, pixel_count(size_), staged);
+void FrameTransfer::fetch(const cl::Buffer& buffer, std::size_t bytes, Output output) {
+  std::vector<char>& staged = fetched_[static_cast<std::size_t>(output)];
+  staged.resize(bytes);
+  fetch(buffer, bytes, staged.data());
+}
+
+void FrameTransfer::fetch_left(const StereoMaps& maps, Output disparity, Output variance, const Wanted& wanted) {
+  const std::size_t bytes = pixel_count(size_) * sizeof(float);
+  if (wanted.has(disparity) || wanted.has(variance)) fetch(maps.disparity.get(), bytes, disparity);
+  if (wanted.has(variance)) fetch(maps.variance.get(), bytes, variance);
 }
 
 void FrameTransfer::fetch_view(const ocl::Buffer<float>& maps, int view, const MapView<float>& wanted,
@@ -98,19 +103,16 @@ void FrameTransfer::download(const FrameOnDevice& frame, const FrameOutputs& out
   has_prediction_ = frame.predicted;
   parts_ = frame.parts;
   context_.let_wait(ocl::Queue::kDownload, context_.last_kernel());
-  if (frame.predicted) {
-    const bool wants_variance = outputs.debug.predicted_variance.data;
-    fetch_left(frame.predicted->disparity, outputs.debug.predicted.data || wants_variance, predicted_);
-    fetch_left(frame.predicted->variance, wants_variance, predicted_variance_);
+  const Wanted wanted = wanted_of(outputs);
+  if (frame.predicted) fetch_left(*frame.predicted, Output::kPredicted, Output::kPredictedVariance, wanted);
+  fetch_left(frame.measured, Output::kMeasured, Output::kMeasuredVariance, wanted);
+  for (const PublishedMap& map : frame.published) fetch(map.values, map.bytes, map.output);
+  if (wanted.has(Output::kSearchWidth)) {
+    fetch(frame.bands.bands.get(), pixel_count(size_) * sizeof(shared::Band), Output::kSearchWidth);
   }
-  const bool wants_variance = outputs.debug.measured_variance.data;
-  fetch_left(frame.measured.disparity, outputs.debug.measured.data || wants_variance, measured_);
-  fetch_left(frame.measured.variance, wants_variance, measured_variance_);
-  if (frame.dynamic) fetch(*frame.dynamic, pixel_count(size_), dynamic_);
-  if (frame.reasons) fetch(*frame.reasons, pixel_count(size_), reasons_);
-  if (outputs.debug.search_width.data) fetch(frame.bands.bands, pixel_count(size_), bands_);
-  fetch(frame.bands.row_sums, static_cast<std::size_t>(count(frame.matched)) * size_.height, row_sums_);
-  fetch(frame.offset.terms, 1, vertical_offset_px_);
+  row_sums_.resize(static_cast<std::size_t>(count(frame.matched)) * size_.height);
+  fetch(frame.bands.row_sums.get(), row_sums_.size() * sizeof(shared::RowSum), row_sums_.data());
+  fetch(frame.offset.terms.get(), sizeof(float), &vertical_offset_px_);
 
   disparity_.fetch(frame.result.disparity, 0, pixel_count(size_));  // always: the report counts its valid pixels
   fetch_view(frame.result.variance, EGOSGM_LEFT, outputs.variance, variance_);
@@ -118,30 +120,47 @@ void FrameTransfer::download(const FrameOnDevice& frame, const FrameOutputs& out
   fetch_view(frame.result.variance, EGOSGM_RIGHT, outputs.right_variance, right_variance_);
 }
 
-void FrameTransfer::collect(FrameReport& report) const {
-  copy_rows(disparity_.data(), outputs_.disparity);
-  copy_rows(variance_.data(), outputs_.variance);
-  copy_rows(right_disparity_.data(), outputs_.right_disparity);
-  copy_rows(right_variance_.data(), outputs_.right_variance);
-  if (has_prediction_) {
-    copy_rows(predicted_.data(), outputs_.debug.predicted);
-    copy_variances(predicted_variance_.data(), predicted_.data(), outputs_.debug.predicted_variance);
-  } else {
-    fill_rows(kInvalidDisparity, outputs_.debug.predicted);
-    fill_rows(0.0f, outputs_.debug.predicted_variance);
+void FrameTransfer::give(const OutputText& text, const MapView<float>& view) const {
+  const bool is_predicted = text.output == Output::kPredicted || text.output == Output::kPredictedVariance;
+  const bool is_variance = text.output == Output::kPredictedVariance || text.output == Output::kMeasuredVariance;
+  if (is_predicted && !has_prediction_) return fill_rows(is_variance ? 0.0f : kInvalidDisparity, view);
+  switch (text.output) {
+    case Output::kDisparity:
+      return copy_rows(disparity_.data(), view);
+    case Output::kVariance:
+      return copy_rows(variance_.data(), view);
+    case Output::kRightDisparity:
+      return copy_rows(right_disparity_.data(), view);
+    case Output::kRightVariance:
+      return copy_rows(right_variance_.data(), view);
+    case Output::kPredictedVariance:
+      return copy_variances(fetched<float>(text.output), fetched<float>(Output::kPredicted), view);
+    case Output::kMeasuredVariance:
+      return copy_variances(fetched<float>(text.output), fetched<float>(Output::kMeasured), view);
+    default:
+      copy_rows(fetched<float>(text.output), view);
   }
-  copy_rows(measured_.data(), outputs_.debug.measured);
-  copy_variances(measured_variance_.data(), measured_.data(), outputs_.debug.measured_variance);
-  copy_rows(dynamic_.data(), outputs_.debug.dynamic);
-  copy_rows(reasons_.data(), outputs_.reason);
-  copy_rows(bands_.data(), outputs_.debug.search_width,
+}
+
+void FrameTransfer::give(const OutputText& text, const MapView<std::uint16_t>& view) const {
+  copy_rows(fetched<shared::Band>(text.output), view,
             [](const shared::Band& b) { return static_cast<std::uint16_t>(b.last - b.first + 1); });
+}
+
+void FrameTransfer::give(const OutputText& text, const MapView<std::uint8_t>& view) const {
+  copy_rows(fetched<std::uint8_t>(text.output), view);
+}
+
+void FrameTransfer::collect(FrameReport& report) const {
+  for_each_output(outputs_, [&](const OutputText& text, const auto& view) {
+    if (view.data) give(text, view);
+  });
 
   report_matching({size_, range_, row_sums_, parts_, has_prediction_}, report);
   report.density = static_cast<double>(std::count_if(disparity_.data(), disparity_.data() + pixel_count(size_),
                                                      [](float d) { return d > kInvalidDisparity; })) /
                    static_cast<double>(pixel_count(size_));
-  report.vertical_offset_px = vertical_offset_px_[0];
+  report.vertical_offset_px = vertical_offset_px_;
 }
 
 void FrameTransfer::release() {

@@ -7,6 +7,7 @@
 
 #include "egosgm/pipeline.h"
 #include "host/frame/frame_report.h"
+#include "host/method/publish_step.h"
 #include "host/ocl/host_memory.h"
 #include "host/stages/maps.h"
 #include "host/stages/search_band.h"
@@ -23,8 +24,7 @@ struct FrameOnDevice {
   Views matched;  // they are of these
   MatchedParts parts;
   const VerticalOffset& offset;
-  const ocl::Buffer<cl_uchar>* dynamic;            // null where it was not asked for
-  const ocl::Buffer<cl_uchar>* reasons = nullptr;  // the same
+  std::vector<PublishedMap> published;
 };
 
 /// Brings a frame's images to the device and its results back: one for each frame that may
@@ -55,11 +55,18 @@ class FrameTransfer {
 
  private:
   using MapReadback = ocl::Readback<float>;
-  using Scratch = std::vector<float>;
 
+  void fetch(const cl::Buffer& buffer, std::size_t bytes, void* to);
+  void fetch(const cl::Buffer& buffer, std::size_t bytes, Output output);
+  /// A disparity with its variance, or without, of the left view.
+  void fetch_left(const StereoMaps& maps, Output disparity, Output variance, const Wanted& wanted);
   template <typename T>
-  void fetch(const ocl::Buffer<T>& buffer, std::size_t count, std::vector<T>& staged);
-  void fetch_left(const ocl::Buffer<float>& maps, bool wanted, Scratch& staged);
+  const T* fetched(Output output) const {
+    return reinterpret_cast<const T*>(fetched_[static_cast<std::size_t>(output)].data());
+  }
+  void give(const OutputText& text, const MapView<float>& view) const;
+  void give(const OutputText& text, const MapView<std::uint16_t>& view) const;
+  void give(const OutputText& text, const MapView<std::uint8_t>& view) const;
   void fetch_view(const ocl::Buffer<float>& maps, int view, const MapView<float>& wanted, MapReadback& readback);
 
   ocl::Context& context_;
@@ -69,9 +76,8 @@ class FrameTransfer {
   ocl::Buffer<float> output_disparity_, output_variance_;
   ocl::Upload upload_;
   MapReadback disparity_, variance_, right_disparity_, right_variance_;
-  Scratch predicted_, predicted_variance_, measured_, measured_variance_, vertical_offset_px_;
-  std::vector<shared::Band> bands_;
-  std::vector<cl_uchar> dynamic_, reasons_;
+  std::array<std::vector<char>, kOutputCount> fetched_;  // what the next frame overwrites on the device
+  float vertical_offset_px_ = 0;
   std::vector<shared::RowSum> row_sums_;  // of the views that were searched
   MatchedParts parts_{};
   cl::Event scratch_fetched_;

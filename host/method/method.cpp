@@ -28,7 +28,7 @@ FrameResults Method::frame(const Plan& plan, const FrameImages& uploaded, const 
     publish_.write(plan,
                    {images, match_.matcher().codes(), prediction, measured, match_.speckle_runs(plan), after.maps,
                     result, w.fusion.doubtful, evidence_of(plan, after), w.fusion.evidence.evidence, plan.grey_step},
-                   {given_out.variance, w.dynamic, w.reasons});
+                   given_out.variance, w.published);
   });
   return {{result, given_out.variance}, measured, offset, images};
 }
@@ -84,8 +84,7 @@ Workspace::Workspace(ocl::Context& context, shared::ImageSize size, const Method
       matching(context, size),
       measured(context, size),
       fusion(context, size),
-      dynamic(context, pixel_count(size)),
-      reasons(context, pixel_count(size)) {}
+      published(context, size) {}
 
 Method::Method(ocl::Context& context, shared::ImageSize size, const Calibration& calibration,
                const MethodOptions& options, const Tuning& tuning)

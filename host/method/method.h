@@ -25,7 +25,7 @@ struct Workspace {
   Matching matching;
   StereoMaps measured;  // where there is a prediction to fuse it with; else the belief's memory
   Fusion fusion;
-  ocl::Buffer<cl_uchar> dynamic, reasons;
+  Published published;
 
   Workspace(ocl::Context& context, shared::ImageSize size, const MethodOptions& options);
 };

@@ -5,20 +5,13 @@
 
 #include "egosgm/motion.h"
 #include "egosgm/pipeline.h"
+#include "host/frame_outputs.h"
 #include "host/stages/maps.h"
 
 namespace egosgm {
 
 /// The disparities that a frame searches.
 enum class Search { kBands, kEverything };
-
-/// Results that a caller asks for and no later frame needs.
-struct Wanted {
-  std::optional<Views> variance = {};  // the one that is given out
-  bool dynamic = false;
-  bool right = true;  // the right view's maps, too; where that is not tracked, no later frame needs them
-  bool reasons = false;
-};
 
 /// All that is decided before a frame.
 struct Plan {

@@ -3,6 +3,19 @@
 
 namespace egosgm {
 
+Published::Published(ocl::Context& context, shared::ImageSize size)
+    : reason(context, pixel_count(size)), dynamic(context, pixel_count(size)) {}
+
+std::vector<PublishedMap> Published::maps(const Wanted& wanted) const {
+  std::vector<PublishedMap> maps;
+  const auto add = [&]<typename T>(Output output, const ocl::Buffer<T>& map) {
+    if (wanted.has(output)) maps.push_back({output, map.get(), map.size() * sizeof(T)});
+  };
+  add(Output::kReason, reason);
+  add(Output::kDynamic, dynamic);
+  return maps;
+}
+
 PublishStep::PublishStep(ocl::Context& context, shared::ImageSize size, const MethodOptions& options)
     : context_(context),
       output_variance_(context, size, options.output_variance),
@@ -13,20 +26,22 @@ PublishStep::PublishStep(ocl::Context& context, shared::ImageSize size, const Me
 }
 
 void PublishStep::prepare(PixelType type, const Wanted& wanted) {
-  if (wanted.reasons) reasons_.prepare(type);
+  if (wanted.has(Output::kReason)) reasons_.prepare(type);
 }
 
-void PublishStep::write(const Plan& plan, const Reasons::Inputs& inputs, const Outputs& outputs) {
-  if (plan.wanted.variance) {
-    output_variance_.compute(inputs.given_out, inputs.belief, inputs.measured, outputs.variance, *plan.wanted.variance);
+void PublishStep::write(const Plan& plan, const Reasons::Inputs& inputs, Map& variance, Published& published) {
+  const Wanted& wanted = plan.wanted;
+  if (wanted.has(Output::kVariance) || wanted.has(Output::kRightVariance)) {
+    output_variance_.compute(inputs.given_out, inputs.belief, inputs.measured, variance,
+                             wanted.has(Output::kRightVariance) ? Views::kBoth : Views::kLeft);
   }
-  if (plan.wanted.reasons) reasons_[inputs.images.type].explain(inputs, outputs.reasons);
-  if (!plan.wanted.dynamic) return;
+  if (wanted.has(Output::kReason)) reasons_[inputs.images.type].explain(inputs, published.reason);
+  if (!wanted.has(Output::kDynamic)) return;
   if (inputs.prediction) {
-    dynamic_map_->mark(inputs.prediction->maps.disparity, inputs.measured.disparity, outputs.dynamic);
+    dynamic_map_->mark(inputs.prediction->maps.disparity, inputs.measured.disparity, published.dynamic);
   } else {
     context_.enter("DynamicMap");
-    outputs.dynamic.fill(context_, 0);
+    published.dynamic.fill(context_, 0);
   }
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <vector>
+
 #include "host/method/plan.h"
 #include "host/method/predict_step.h"
 #include "host/stages/dynamic_map.h"
@@ -8,6 +10,22 @@
 #include "host/stages/reasons.h"
 
 namespace egosgm {
+
+/// An output on the device: a value a pixel of the left view.
+struct PublishedMap {
+  Output output;
+  cl::Buffer values;
+  std::size_t bytes;
+};
+
+/// Outputs of a frame that no later frame needs. The next frame overwrites them.
+struct Published {
+  ocl::Buffer<cl_uchar> reason, dynamic;
+
+  Published(ocl::Context& context, shared::ImageSize size);
+  /// Those that are wanted.
+  std::vector<PublishedMap> maps(const Wanted& wanted) const;
+};
 
 /// Makes what is given out and no later frame rests on.
 class PublishStep {
@@ -17,14 +35,8 @@ class PublishStep {
   /// Builds what is wanted of images of `type`.
   void prepare(PixelType type, const Wanted& wanted);
 
-  struct Outputs {
-    Map& variance;                   // [px^2] of what is given out
-    ocl::Buffer<cl_uchar>& dynamic;  // marks of what contradicts a static world
-    ocl::Buffer<cl_uchar>& reasons;
-  };
-
-  /// Writes what the plan wants.
-  void write(const Plan& plan, const Reasons::Inputs& inputs, const Outputs& outputs);
+  /// Writes what the plan wants. `variance`: [px^2] of what is given out.
+  void write(const Plan& plan, const Reasons::Inputs& inputs, Map& variance, Published& published);
 
  private:
   ocl::Context& context_;

@@ -299,7 +299,7 @@ TEST(SearchBand, ReportsAllThatWasMatched) {
   SearchBands bands(context, size, {0, 100});
   const auto report_of = [&](Views views, const MatchedParts& parts) {
     stage.narrow(predicted, {}, bands, views);
-    transfer.download({predicted, &predicted, predicted, bands, views, parts, offset, /*dynamic=*/nullptr}, {});
+    transfer.download({predicted, &predicted, predicted, bands, views, parts, offset, {}}, {});
     context.wait();
     FrameReport report;
     transfer.collect(report);

@@ -22,13 +22,13 @@ class StageChain {
         transfer_(context_, size, range_of(options)),
         before_(context_, size),
         after_(context_, size) {
-    method_.prepare(type, {.reasons = true});
+    method_.prepare(type, {Output::kReason});
   }
 
   reference::Frame process(const ImageView& left, const ImageView& right, const std::optional<Motion>& motion) {
     reference::Frame frame;
-    const Plan plan =
-        plan_of(options_, before_.why_not, before_.offset.is_known, motion, {Views::kBoth, true, true, true});
+    const Wanted wanted{Output::kReason, Output::kRightDisparity, Output::kRightVariance, Output::kDynamic};
+    const Plan plan = plan_of(options_, before_.why_not, before_.offset.is_known, motion, wanted);
     const FrameImages& uploaded = transfer_.upload(left, right);
     method_.observer = [&](Step step) {
       look(step, plan, uploaded, frame);
@@ -64,8 +64,8 @@ class StageChain {
         if (plan.predicts()) look(work.fusion, frame);
         return;
       case Step::kPublish:
-        frame.dynamic = work.dynamic.read(context_);
-        frame.reasons = work.reasons.read(context_);
+        frame.dynamic = work.published.dynamic.read(context_);
+        frame.reasons = work.published.reason.read(context_);
         return;
       case Step::kRefineAlignment:
         return;
