@@ -11,7 +11,7 @@
 
 namespace egosgm::app {
 
-/// What the program returns to the shell. docs/use/program.md, "Exit codes".
+/// Exit codes of the program. docs/use/program.md, "Exit codes".
 enum ExitCode : int { kOk = 0, kFailed = 1, kBadInput = 2, kInterrupted = 130 };
 
 /// A subcommand and what it does once its arguments are parsed; `run` returns an ExitCode or throws.

@@ -13,7 +13,7 @@ struct ShownMaps {
   vision::Image disparity, variance, reason;
 };
 
-/// Who takes a run's maps beside its folder, or in place of it.
+/// A sink takes a run's maps beside its folder, or in place of it.
 class FrameSink {
  public:
   virtual ~FrameSink() = default;

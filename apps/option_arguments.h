@@ -26,7 +26,7 @@ struct OptionArguments {
   void save(const PipelineOptions& options) const;
 };
 
-/// What --save-config writes.
+/// The text that --save-config writes.
 std::string config_text(const PipelineOptions& options);
 
 }  // namespace egosgm::app

@@ -20,7 +20,7 @@ using Json = nlohmann::ordered_json;
 constexpr std::size_t kMaxReportBytes = std::size_t{1} << 30;
 constexpr std::size_t kAnySize = std::numeric_limits<std::size_t>::max() - 1;
 
-/// Where a path leads, also one that is not there yet. A pipe of this process is in no folder: it keeps its name.
+/// Resolves a path, also one that is not there yet. A pipe of this process is in no folder: it keeps its name.
 fs::path place_of(const fs::path& path) {
   std::error_code error;
   if (fs::is_fifo(path, error)) return fs::absolute(path);
@@ -29,7 +29,7 @@ fs::path place_of(const fs::path& path) {
   return result.has_filename() ? result : result.parent_path();
 }
 
-/// Where a file's name is, which may be a link.
+/// Resolves the folder of a file's name, which may be a link.
 fs::path place_of_name(const std::string& file) {
   return place_of(fs::absolute(file).parent_path()) / fs::path(file).filename();
 }
@@ -87,7 +87,7 @@ void expect_named(const std::string& option, const std::string& path) {
   if (path.empty()) throw InvalidArgument(option + " \"\": give a name");
 }
 
-/// Of the frames whose pairs an earlier run could not read.
+/// Names of the frames whose pairs an earlier run could not read.
 std::set<std::string> names_left_out(const Json& report) {
   std::set<std::string> names;
   const auto left_out = report.find("left_out");

@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
-// Where the program may write. It deletes nothing, and it replaces nothing but the report and the poses of a run that
-// goes on: a folder is new or empty, or holds a run that --resume names, and a file is new.
+// Decides whether the program may write to a place. It deletes nothing, and it replaces nothing but the report and the
+// poses of a run that goes on: a folder is new or empty, or holds a run that --resume names, and a file is new.
 
 namespace egosgm::app {
 

@@ -145,8 +145,8 @@ int parse_and_run(int argc, const char* const* argv, const Package* package) {
   return flushed(chosen->run());
 }
 
-/// What an interrupt came into is no error of it: PoCL's compiler takes one for itself, too, and a pipe that is waited
-/// for ends.
+/// A call that an interrupt came into has not failed: PoCL's compiler takes one for itself, too, and a pipe that is
+/// waited for ends.
 int failed_or_interrupted(int code, const std::string& what) {
   if (interrupted()) return say("egosgm: interrupted"), kInterrupted;
   return fail(code, what);

@@ -26,7 +26,7 @@ std::optional<Device> fallback_of(const RunArguments& arguments) {
   return tuned_by_argument(Device::select(arguments.fallback).with_cache(arguments.cache), arguments.tuning);
 }
 
-/// What is left of a job whose device failed: what was written stays.
+/// The rest of a job whose device failed: its written files stay.
 SequenceJob rest_of(RunArguments arguments, const Package& package, const LostDevice& lost) {
   arguments.resume = true;
   for (std::string* file : {&arguments.trace, &arguments.method.save_config}) {

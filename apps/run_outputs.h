@@ -18,17 +18,17 @@
 
 namespace egosgm::app {
 
-/// What `egosgm run` can write beside OUT/disparity, each into a folder of its own, a file a frame.
+/// Parses the outputs that `egosgm run` writes beside OUT/disparity, a folder each, a file a frame.
 std::set<std::string> parse_write_list(const std::string& list);
 /// A file of a frame, relative to OUT, and those of all frames. Disparities are KITTI's PNG, or PFM where that has no
 /// room for the searched range.
 std::string output_file(const std::string& kind, const std::string& frame, const PipelineOptions& options);
 std::vector<std::string> output_files(const std::set<std::string>& kinds, const vision::StereoSequence& sequence,
                                       const PipelineOptions& options);
-/// What parse_write_list takes, as --help describes it.
+/// The names that parse_write_list takes, as --help describes them.
 std::string write_list_help();
 
-/// How many points a frame's cloud has, and what it left out.
+/// Counts of a frame's points, and of those that its cloud left out.
 struct CloudCounts {
   std::int64_t points = 0;
   vision::LeftOut left_out;
@@ -47,7 +47,7 @@ class RunOutputs {
   RunOutputs(std::filesystem::path folder, std::set<std::string> kinds, vision::Size size,
              const PipelineOptions& options, const Calibration& calibration, const vision::PointCloudOptions& cloud);
 
-  /// Where the pipeline is to write; valid as long as this object lives.
+  /// The views that the pipeline writes to; valid as long as this object lives.
   const FrameOutputs& views() const { return outputs_; }
 
   /// Makes these, too, whatever is written.

@@ -47,13 +47,13 @@ class RunReport {
 
   /// A pair that could not be read.
   void leave_out(const vision::StereoFrame& frame, const std::string& why);
-  /// What speaks against the input, see Doubt, and what was unusual about its frames.
+  /// Records what speaks against the input (see Doubt), and unusual things about its frames.
   void set_doubt(const std::string& doubt, const std::vector<std::string>& notes);
 
   /// `finished`: whether all frames ran; else `why_not` says what stopped them. Throws IoError.
   void write(const std::filesystem::path& file, bool finished, const std::string& why_not = {});
 
-  /// Of a fraction of the frames. One that matched the range more than once counts as 1.
+  /// The mean of a figure over the frames. A frame that matched the range more than once counts as 1.
   double mean(const char* figure) const;
 
  private:

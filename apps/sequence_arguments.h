@@ -25,7 +25,7 @@ struct SequenceArguments {
   /// Throws InvalidArgument unless exactly one sequence was named, and as the openers do, and where the sequence has no
   /// calibration and `needs_calibration`. `read`: for calibrations of other programs, where somebody reads them.
   vision::StereoSequence open(bool needs_calibration = true, const CalibrationReader& read = {}) const;
-  /// What was given, as a shell takes it for any command that reads a sequence.
+  /// The arguments, as a shell takes them for any command that reads a sequence.
   std::string text() const;
 
  private:
@@ -40,7 +40,7 @@ struct BagArguments {
   void add_to(CLI::App& command);
   /// An option of a bag that was given without one; else empty.
   std::string option_without_bag() const;
-  /// As SequenceArguments::text.
+  /// See SequenceArguments::text.
   std::string text() const;
 
  private:

@@ -34,7 +34,7 @@ void open_standard_streams() {
     if (::fcntl(stream, F_GETFD) < 0 && errno == EBADF) ::open("/dev/null", way);  // takes the lowest that is free
   }
   std::signal(SIGPIPE, SIG_IGN);
-  // What is printed once the work is done fits, so that it fails where the exit code is known.
+  // The buffer holds all that is printed once the work is done, so that a write fails where the exit code is known.
   if (isatty(STDOUT_FILENO) != 1) std::setvbuf(stdout, nullptr, _IOFBF, kBufferBytes);
 }
 

@@ -10,7 +10,7 @@
 
 namespace egosgm::app {
 
-/// Where the time of a run goes, in Chrome's trace format (Perfetto and chrome://tracing open it): a row for each of
+/// Records the times of a run in Chrome's trace format (Perfetto and chrome://tracing open it): a row for each of
 /// the device's queues, one for what the host does before a frame, one for what it does after. Not thread-safe.
 class Trace {
  public:

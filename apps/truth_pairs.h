@@ -18,7 +18,7 @@ vision::EvaluationPairs find_truth_pairs(const std::filesystem::path& estimate, 
 /// One sentence: with which files or folder the estimates were compared, and what belongs together by number only.
 std::string text_of(const vision::EvaluationPairs& pairs);
 
-/// What is compared with what: `COMMAND ESTIMATE TRUTH`, or --estimate and --truth, or one of each kind; and --frames.
+/// The files to compare: `COMMAND ESTIMATE TRUTH`, or --estimate and --truth, or one of each kind; and --frames.
 struct ComparisonArguments {
   std::string estimate, truth, frames;
 

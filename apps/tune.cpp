@@ -61,7 +61,7 @@ std::vector<Trial> trials(bool is_gpu) {
   return all;
 }
 
-/// Of `stage`, or all where that is empty. Throws InvalidArgument where the device has none of it.
+/// The trials of `stage`, or all where that is empty. Throws InvalidArgument where the device has none of it.
 std::vector<Trial> trials_of(const std::string& stage, const DeviceInfo& device) {
   std::vector<Trial> all = trials(device.type == DeviceType::kGpu);
   if (stage.empty()) return all;
@@ -73,7 +73,7 @@ std::vector<Trial> trials_of(const std::string& stage, const DeviceInfo& device)
       fmt::format("--stage {}: has no sizes to choose on a {}: choose another stage", stage, to_string(device.type)));
 }
 
-/// What is kept for the device, but the sizes that are tried.
+/// The device's kept tuning without the sizes that are tried.
 Tuning kept_beside(const std::vector<Trial>& trials, const std::filesystem::path& file, const DeviceInfo& device) {
   Tuning tuning;
   if (std::filesystem::is_regular_file(file)) tuning = kept_tuning(file, device).value_or(tuning);

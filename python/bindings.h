@@ -13,7 +13,7 @@ namespace egosgm::python {
 /// "7:10", "7:", ":10" or "7"; empty: all.
 vision::FrameRange range_of(const std::string& frames);
 
-/// Of a text that may hold the name of a file: bytes that are no UTF-8 stand in it as they do in Python's paths.
+/// Decodes a text that may hold the name of a file: bytes that are no UTF-8 stand in it as they do in Python's paths.
 pybind11::str text_of(const std::string& text);
 /// The other way round.
 std::string text_from(const pybind11::handle& text);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where Python enters a module that has a part for each of several Pythons: calls that of the one that runs.
+// Python enters a module with a part for each of several Pythons here: this calls the part of the one that runs.
 #define Py_LIMITED_API 0x03090000
 #include <Python.h>
 

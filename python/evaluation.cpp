@@ -85,7 +85,7 @@ void bind_disparity(py::module_& module) {
   module.def("mean_of", &vision::mean_of, py::arg("images"), "The mean of each image's figures (KITTI 2012).");
 }
 
-/// What the commands eval-video and eval-poses share with eval: which files belong together, and what they hold.
+/// Binds what the commands eval-video and eval-poses share with eval: which files belong together, and what they hold.
 void bind_estimates(py::module_& module) {
   using std::filesystem::path;
   using vision::EstimateReader;

@@ -9,7 +9,7 @@
 
 namespace egosgm::python {
 
-/// What a frame gave: arrays by the names of their maps.
+/// The maps of a frame: arrays by their names.
 struct Frame {
   pybind11::dict maps;
   FrameReport report;

@@ -13,7 +13,7 @@ namespace py = pybind11;
 
 namespace {
 
-/// As py::register_exception does, which takes texts of UTF-8 alone.
+/// Registers an exception like py::register_exception, which takes texts of UTF-8 alone.
 template <typename Exception>
 py::object bind_error(py::module_& module, const char* name, const py::object& bases, const char* meaning) {
   static PyObject* kind = nullptr;  // lives as long as the interpreter

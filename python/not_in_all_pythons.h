@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What pybind11 calls of some Pythons and others do not have: the part of another Python in the module is loaded, and
-// never runs.
+// Functions that pybind11 calls of some Pythons and others do not have: the part of another Python in the module is
+// loaded, and never runs.
 __asm__(
     ".weak PyObject_ClearManagedDict\n"
     ".weak PyObject_Vectorcall\n"

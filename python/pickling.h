@@ -18,7 +18,7 @@ namespace egosgm::python {
 
 namespace py = pybind11;
 
-/// How a member is stored.
+/// The stored form of a member.
 template <typename T>
 struct Stored {
   static py::object of(const T& value) {

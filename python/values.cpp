@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a pipeline is given: calibration, motion, device, options.
+// Inputs of a pipeline: calibration, motion, device, options.
 #include <pybind11/stl.h>
 
 #include "egosgm/calibration.h"

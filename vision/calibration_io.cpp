@@ -291,7 +291,7 @@ bool has_all(std::string_view text, std::initializer_list<std::string_view> word
                      [&](std::string_view word) { return text.find(word) != std::string_view::npos; });
 }
 
-/// What a file is that is none of the formats here; empty where that is not known.
+/// Names the format of a file that is none of those here; empty where it is not known.
 std::string_view foreign_format(std::string_view text) {
   struct Format {
     std::initializer_list<std::string_view> words;

@@ -58,7 +58,7 @@ int slope_at(const Image& image, int x, int y) {
   return slope;
 }
 
-/// As coarse_map, of bytes.
+/// The coarse map of images of bytes.
 Image coarse_map_of(const Image& left, const Image& right, double row_offset_px, int least, int end) {
   const int factor = std::max(1, (std::max(left.cols, left.rows) + kCoarseSide - 1) / kCoarseSide);
   const Size size(left.cols / factor, left.rows / factor);

@@ -14,7 +14,7 @@ namespace egosgm::vision {
 /// down. REQUIRES: images of one size, both kU8 or both kU16. Thread-safe.
 EGOSGM_EXPORT Image coarse_map(const Image& left, const Image& right, double row_offset_px, int least, int end);
 
-/// What of a pair is nearer than the range of disparities ends, by its coarse map.
+/// The part of a pair that is nearer than the range of disparities ends, by its coarse map.
 struct Clipped {
   double share;     // of the pixels of which the map is sure
   int disparities;  // with which the range would hold nearly all

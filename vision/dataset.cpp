@@ -147,7 +147,7 @@ KittiCameras cameras_of(const fs::path& folder) {
   return KittiCameras::kAny;
 }
 
-/// Of a file with both of KITTI's pairs of cameras, images in colour are of the second one, whatever their folder is
+/// Reads a file with both of KITTI's pairs of cameras: images in colour are of the second one, whatever their folder is
 /// called.
 SizedCalibration calibration_of(const fs::path& file, const fs::path& folder, const std::vector<StereoFrame>& frames) {
   const KittiCameras cameras = cameras_of(folder);

@@ -35,7 +35,7 @@ std::string formatted(const char* format, Values... values) {
 
 void append(std::string& text, const std::string& part) { text += (text.empty() ? "" : ", ") + part; }
 
-/// Of all bytes; images that differ have different ones, as good as surely.
+/// The digest of all bytes; images that differ have different ones, as good as surely.
 std::uint64_t digest_of(const Image& image) {
   std::uint64_t digest = 0;
   for (int y = 0; y < image.rows; ++y) {

@@ -15,7 +15,7 @@
 
 namespace egosgm::vision {
 
-/// What speaks against a value, and what to do about it.
+/// An objection to a value, and the remedy.
 struct Suspicion {
   std::string what, remedy;
   bool is_certain = true;  // else it may be right, but seldom is
@@ -25,11 +25,11 @@ struct Suspicion {
 /// where it is not known. Thread-safe.
 EGOSGM_EXPORT std::optional<Suspicion> suspect_baseline(double baseline_m, double fx = 0);
 
-/// The same, and a focal length or a principal point that does not fit images of `size`, where that is known.
-/// Thread-safe.
+/// Doubts a calibration, also for a focal length or a principal point that does not fit images of `size`, where that is
+/// known. Thread-safe.
 EGOSGM_EXPORT std::optional<Suspicion> suspect_calibration(const Calibration& calibration, Size size);
 
-/// What speaks against a run's input once it is matched: a mean density below a half (maps of good input keep four
+/// Doubts about a run's input once it is matched: a mean density below a half (maps of good input keep four
 /// fifths and more), no motion in most frames that have one before them, mosaics, images of 16 bits that hold 8, rows
 /// that are farther apart than the vertical alignment mends, a camera that stands still while the other one does not,
 /// one camera's images on both sides, what is nearer than the range, a suspected calibration.

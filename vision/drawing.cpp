@@ -19,7 +19,7 @@ constexpr std::array<std::uint32_t, 33> kTurbo{
     0x1fe9af, 0x32f298, 0x4ef97d, 0x6dfe62, 0x8bff4b, 0xa4fc3c, 0xb7f735, 0xcbed34, 0xdde037, 0xecd13a, 0xf7c13a,
     0xfdae35, 0xfe992c, 0xfb8122, 0xf56918, 0xec530f, 0xe14109, 0xd23105, 0xc12302, 0xac1701, 0x950d01, 0x7a0403};
 
-/// Of each character from the blank on, five columns of eight bits, the uppermost pixel in the lowest bit.
+/// Each character from the blank on has five columns of eight bits, the uppermost pixel in the lowest bit.
 constexpr std::uint8_t kLetters[][5] = {
     {0x00, 0x00, 0x00, 0x00, 0x00}, {0x00, 0x00, 0x5f, 0x00, 0x00}, {0x00, 0x07, 0x00, 0x07, 0x00},
     {0x14, 0x7f, 0x14, 0x7f, 0x14}, {0x24, 0x2a, 0x7f, 0x2a, 0x12}, {0x23, 0x13, 0x08, 0x64, 0x62},
@@ -55,7 +55,7 @@ constexpr std::uint8_t kLetters[][5] = {
     {0x00, 0x41, 0x36, 0x08, 0x00}, {0x02, 0x01, 0x02, 0x04, 0x02}};
 constexpr int kColumns = 5, kRows = 8, kAdvance = 6;
 
-/// How much of the pixels from `begin` on, one after the other, lies between `begin` and `end`.
+/// Visits the pixels from `begin` on with the share of each that lies between `begin` and `end`.
 template <typename Visit>
 void for_each_part(double begin, double end, int count, const Visit& visit) {
   for (int i = static_cast<int>(begin); i < std::min(count, static_cast<int>(std::ceil(end))); ++i) {

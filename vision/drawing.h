@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What pictures of maps are drawn with.
+// Tools to draw pictures of maps.
 #pragma once
 
 #include <string>

@@ -22,7 +22,7 @@ EGOSGM_EXPORT Image read_scaled(const std::filesystem::path& file, double scale)
 /// map's width, which no two images can show. Thread-safe.
 class EGOSGM_EXPORT EstimateReader {
  public:
-  /// As read_scaled.
+  /// See read_scaled.
   Image read(const std::filesystem::path& file, double scale);
 
   /// Looks at an estimate beside its truth.

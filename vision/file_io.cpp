@@ -161,7 +161,7 @@ int give_name(const fs::path& from, const fs::path& to) {
   return ::rename(from.c_str(), to.c_str()) == 0 ? 0 : errno;  // a file system without links
 }
 
-/// What a write to a file reaches.
+/// The target of a write to a file.
 struct Target {
   fs::path file;  // links are followed, those to nothing too
   bool exists = false;

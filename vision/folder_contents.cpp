@@ -149,7 +149,7 @@ Contents videos(const fs::path& folder) {
   return std::nullopt;
 }
 
-/// What the folders of both cameras may be called: the usual names, then any with left or right in it that holds
+/// Names of the folders of both cameras: the usual ones, then any with left or right in it that holds
 /// images.
 std::vector<std::pair<std::string, std::string>> names_of_cameras(const fs::path& folder) {
   std::vector<std::pair<std::string, std::string>> names{

@@ -10,7 +10,7 @@
 
 namespace egosgm::vision {
 
-/// What a folder that is no stereo sequence holds instead, and what to give in its place: "it holds sequences/00: give
+/// The contents of a folder that is no stereo sequence, and what to give in its place: "it holds sequences/00: give
 /// one of them". Nothing where nothing is known. Thread-safe.
 std::optional<std::string> found_instead(const std::filesystem::path& folder);
 

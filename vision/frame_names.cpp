@@ -22,7 +22,7 @@ std::string without_zeros(const std::string& digits) {
   return digits.substr(std::min(digits.find_first_not_of('0'), digits.size() - 1));
 }
 
-/// What stands between prefix and suffix; nothing where the name does not match. The number of a frame has no zeros
+/// The text between prefix and suffix; nothing where the name does not match. The number of a frame has no zeros
 /// before it.
 std::optional<std::string> text_in(const std::string& name, const NamePattern& pattern) {
   std::string suffix = pattern.suffix;
@@ -130,7 +130,7 @@ std::vector<NamedPair> pair_by_name(const Files& left, const Files& right) {
 
 std::string bound_text(const std::optional<int>& bound) { return bound ? std::to_string(*bound) : ""; }
 
-/// What is unusual in the numbers of frames that follow each other; empty where nothing is.
+/// Notes gaps in the numbers of frames that follow each other; empty without gaps.
 std::string gap_note(const std::vector<StereoFrame>& frames) {
   std::size_t gaps = 0, first = 0;
   bool even = true;

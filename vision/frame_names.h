@@ -44,7 +44,7 @@ struct NamedPair {
 /// one camera mean the same frame.
 std::vector<NamedPair> pair_files(const NamePattern& left, const NamePattern& right, PairBy pair_by);
 
-/// What the names of pairs that were made by order say against them: their last numbers go apart, as where a frame is
+/// The objection of the names to pairs that were made by order: their last numbers go apart, as where a frame is
 /// missing on one side. Empty where they do not.
 std::string order_note(const std::vector<NamedPair>& pairs);
 

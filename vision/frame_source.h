@@ -35,7 +35,7 @@ class EGOSGM_EXPORT FrameSource {
   PixelType type() const { return type_; }
   /// Whether the left images are in no files, so that a run writes them, too.
   virtual bool has_no_files() const { return false; }
-  /// What the poses of its frames are, such as a topic; empty: its frames have none.
+  /// The source of its frames' poses, such as a topic; empty: its frames have none.
   virtual std::string poses() const { return {}; }
   /// The next pair; none at the end. Called by one thread at a time. Throws InvalidArgument.
   virtual std::optional<VideoPair> next() = 0;

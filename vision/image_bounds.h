@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What an image file may take: asked of every file from its header, before its pixels are decoded or allocated.
+// Bounds of an image file: asked of every file from its header, before its pixels are decoded or allocated.
 #pragma once
 
 #include <cstdint>

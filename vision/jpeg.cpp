@@ -17,7 +17,7 @@ namespace {
 constexpr std::string_view kStart("\xff\xd8\xff", 3);
 constexpr int kMaxScans = 100;  // each costs a pass over the whole image, however short it is
 
-/// What libjpeg's callbacks reach. libjpeg leaves an error by longjmp: no object with a destructor may live in the
+/// The state that libjpeg's callbacks reach. libjpeg leaves an error by longjmp: no object with a destructor may live in the
 /// frames between.
 struct Decoder {
   jpeg_error_mgr errors{};

@@ -13,7 +13,7 @@
 
 namespace egosgm::vision {
 
-/// How the camera came to a frame.
+/// The camera's motion to a frame, and its source.
 struct FrameMotion {
   std::optional<Motion> motion;  // from the previous frame; none in the first frame
   bool is_given = false;         // else estimated:
@@ -41,7 +41,7 @@ class EGOSGM_EXPORT MotionSource {
   /// Whether a file tells the poses.
   bool has_file() const { return !poses_.empty(); }
 
-  /// What the odometry of the first frames says against the given poses; empty where nothing, and without such. To be
+  /// The objection of the first frames' odometry to the given poses; empty without one, and without poses. To be
   /// asked from the thread of `next`.
   std::string doubt() const { return suspect_motions(given_, found_); }
 

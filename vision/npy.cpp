@@ -26,7 +26,7 @@ constexpr std::size_t kMaxSides = 64;  // of NumPy itself
                         "; give one H x W array of numbers");
 }
 
-/// What follows `'key':` in the header, without blanks before it.
+/// The text after `'key':` in the header, without blanks before it.
 std::string_view value_of(std::string_view header, std::string_view key, const std::filesystem::path& file) {
   const std::size_t at = header.find(key);
   const std::size_t colon = at == std::string_view::npos ? at : header.find(':', at);

@@ -21,7 +21,7 @@ bool is_map(const fs::path& file) {
   return extension == ".png" || extension == ".pfm" || extension == ".npy" || extension == ".flo";
 }
 
-/// Where data sets keep their truth.
+/// Folders in which data sets keep their truth.
 constexpr const char* kTruthPlaces[] = {
     "truth/left_disp_noc", "truth/left_disp_occ", "disp_noc", "disp_noc_0", "disp_occ",
     "disp_occ_0",          "disp0GT.pfm",         "disp0.pfm"};
@@ -146,7 +146,7 @@ class Pairing {
   EvaluationPairs result_;
 };
 
-/// What kept estimates and truth apart, with an example.
+/// The reason why no estimate met a truth, with an example.
 std::string why_nothing(const Maps& estimates, const std::map<std::string, std::string>& image_names) {
   for (const auto& [name, estimate] : estimates) {
     const auto image = image_names.find(name);

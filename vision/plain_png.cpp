@@ -61,7 +61,7 @@ std::optional<ImageType> type_of(const Chunk& header) {
   return color == kRgb && bits == 8 ? std::optional(kBgr8) : std::nullopt;
 }
 
-/// What is compressed: the data of one chunk after the other, to the file's end.
+/// The compressed data of one chunk after the other, to the file's end.
 std::optional<std::string> compressed_in(std::string_view chunks) {
   std::string compressed;
   while (const std::optional<Chunk> chunk = take_chunk(chunks)) {

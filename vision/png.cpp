@@ -26,8 +26,8 @@ std::uint32_t big_endian_at(std::string_view bytes, std::size_t offset) {
   return value;
 }
 
-/// What libpng's callbacks reach. libpng leaves an error by longjmp: no object with a destructor may live in the frames
-/// between.
+/// The state that libpng's callbacks reach. libpng leaves an error by longjmp: no object with a destructor may live in
+/// the frames between.
 struct Decoder {
   png_structp png = nullptr;
   png_infop info = nullptr;

@@ -24,7 +24,7 @@ double median(std::vector<double> values) {
 
 double angle_of(const Motion& motion) { return Eigen::AngleAxisd(motion.rotation()).angle(); }
 
-/// How far a given motion is from the one that was found, in parts of it.
+/// The distance of a given motion from the one that was found, in parts of it.
 double difference(const Motion& given, const Motion& found) {
   const double moved =
       (given.translation() - found.translation()).norm() / std::max(found.translation().norm(), kLeastMove_m);

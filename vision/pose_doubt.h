@@ -10,7 +10,7 @@
 
 namespace egosgm::vision {
 
-/// What given motions (current_from_previous, one after the other) have wrong, told by the odometry's motions of the
+/// The fault of given motions (current_from_previous, one after the other), told by the odometry's motions of the
 /// same frames: another unit, the inverse, other axes, poses of a frame earlier or later. Empty where they agree, and
 /// where too few frames moved to tell. Thread-safe.
 EGOSGM_EXPORT std::string suspect_motions(const std::vector<Eigen::Isometry3d>& given,

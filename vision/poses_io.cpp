@@ -16,7 +16,7 @@ namespace {
 constexpr std::size_t kMaxPosesBytes = std::size_t{1} << 28;
 constexpr double kMaxRotationError = 1e-4;
 
-/// What rows of other lengths are.
+/// Names rows of other lengths.
 std::string other_poses(const std::vector<std::string_view>& tokens) {
   if (!tokens.empty() && tokens[0].starts_with('#')) return ": it is a comment, as in TUM's files";
   switch (tokens.size()) {

@@ -67,7 +67,7 @@ void require_range(const ColorRange& range) {
   }
 }
 
-/// Where values stand in a range, 0..1.
+/// Maps values to their place in a range, 0..1.
 class Scale {
  public:
   explicit Scale(const ColorRange& range)

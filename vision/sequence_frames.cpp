@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What belongs to the frames of an opened sequence: images, rows of files, poses.
+// The frames of an opened sequence: images, rows of files, poses.
 #include <algorithm>
 #include <exception>
 #include <optional>

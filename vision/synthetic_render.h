@@ -17,7 +17,7 @@ struct Camera {
   }
 };
 
-/// What a ray meets first: a solid (index >= 0), the ground or the sky, at `depth_m` along the optical axis, which is
+/// The first hit of a ray: a solid (index >= 0), the ground or the sky, at `depth_m` along the optical axis, which is
 /// infinite in the sky of a plain street.
 struct Hit {
   static constexpr int kGround = -1, kSky = -2;

@@ -17,8 +17,8 @@ constexpr double kSecondBend = 0.37;  // period of the second sine, in periods o
 
 double range(uint32_t h, double low, double high) { return low + (high - low) * unit(h); }
 
-/// What lies beyond the last frame must fill the view; equal for all sequences of up to 200 m, so that their first
-/// frames agree.
+/// The scene beyond the last frame must fill the view; it is equal for all sequences of up to 200 m, so that their
+/// first frames agree.
 double road_end_m(const SyntheticOptions& options) { return std::max(450.0, options.frames * options.speed_m + 250.0); }
 
 }  // namespace

@@ -74,7 +74,7 @@ class Matching {
     }
   }
 
-  /// Where the best disparity is unique, and the right view's the same.
+  /// The map of pixels whose best disparity is unique, and the right view's too.
   Image map() const {
     Image map(height_, width_, kF32, kNothing);
     for (int y = 0; y < height_; ++y) {

@@ -12,7 +12,7 @@
 
 namespace egosgm {
 
-/// What fusion leaves, beside the belief.
+/// Results of fusion beside the belief.
 struct Fusion {
   Map fused, smoothed;  // disparities, until the step ends; the latter where the median filter is on
   FlagMap doubtful;     // 1 where the measurement was taken although the prediction speaks against it
@@ -33,7 +33,7 @@ class FuseStep {
   /// Builds what images of `type` need.
   void prepare(PixelType type);
 
-  /// What was matched: images and their codes; and by CoarseMatch, or null.
+  /// Inputs of matching: images and their codes; results of CoarseMatch, or null.
   struct Matched {
     const FrameImages& images;
     const ocl::Buffer<cl_uint>& codes;

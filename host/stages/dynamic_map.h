@@ -6,8 +6,8 @@
 
 namespace egosgm {
 
-/// What contradicts a static world, of the left view: 255 at a pixel with a prediction and a measurement where, of
-/// every second pixel of its 9x9 window, at least half of those that have both differ, if a third has both; else 0.
+/// Finds what contradicts a static world, in the left view: 255 at a pixel with a prediction and a measurement where,
+/// of every second pixel of its 9x9 window, at least half of those that have both differ, if a third has both; else 0.
 class DynamicMap {
  public:
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.

@@ -16,7 +16,7 @@ struct BlockEvidence {
   BlockEvidence(ocl::Context& context, shared::ImageSize size);
 };
 
-/// What CoarseMatch made of the images of a frame.
+/// Results of CoarseMatch for a frame.
 struct CoarseView {
   const ocl::Buffer<cl_uchar>& images;  // both views, 16 bits
   const Map& disparity;                 // [coarse px]
@@ -37,7 +37,8 @@ class Evidence {
   void operator()(const ocl::Buffer<cl_uint>& codes, const CoarseView* coarse, const Map& predicted,
                   const Map& measured, BlockEvidence& blocks, Views views);
 
-  /// Of a belief without a prediction: what both views confirm over the full range begins with some evidence.
+  /// Starts a belief without a prediction: a match that both views confirm over the full range begins with some
+  /// evidence.
   void begin(FlagMap& evidence);
   /// Writes the disparities that are confirmed. `tracked`: the views that have evidence of their own.
   void publish(const Map& disparity, const FlagMap& evidence, Map& confirmed, Views views, Views tracked);

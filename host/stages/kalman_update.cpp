@@ -38,9 +38,9 @@ void KalmanUpdate::update(const FlagMap& hidden, const StereoMaps& predicted, co
   }
   stage_.launch_pixels(update_, count(views), has_gate_, gate_px_, keep_predicted_, min_variance_px2_, hidden,
                        predicted.disparity, predicted.variance, measured.disparity, measured.variance,
-                       evidence != nullptr, evidence && evidence->repeats,
-                       evidence ? evidence->before : hidden, blocks.evidence, blocks.found, drifts_, updated.disparity,
-                       updated.variance, doubtful, updated_evidence);
+                       evidence != nullptr, evidence && evidence->repeats, evidence ? evidence->before : hidden,
+                       blocks.evidence, blocks.found, drifts_, updated.disparity, updated.variance, doubtful,
+                       updated_evidence);
 }
 
 }  // namespace egosgm

@@ -14,7 +14,7 @@ namespace egosgm {
 /// gate, as in the paper, all that is predicted and measured is averaged, and nothing hides it.
 class KalmanUpdate {
  public:
-  /// What is known of a frame before it is fused.
+  /// The evidence that a frame has before it is fused.
   struct FrameEvidence {
     const FlagMap& before;        // that moved with the prediction
     const BlockEvidence& blocks;  // of this frame's images
@@ -45,8 +45,8 @@ class KalmanUpdate {
       sum_;
   ocl::Kernel<const shared::ImageSize, const ocl::Buffer<cl_int>, const ocl::Buffer<cl_int>, Map> find_drift_;
   ocl::Kernel<const shared::ImageSize, const cl_int, const float, const cl_int, const float, const FlagMap, const Map,
-              const Map, const Map, const Map, const cl_int, const cl_int, const FlagMap,
-              const ocl::Buffer<cl_int>, const Map, const Map, Map, Map, FlagMap, FlagMap>
+              const Map, const Map, const Map, const cl_int, const cl_int, const FlagMap, const ocl::Buffer<cl_int>,
+              const Map, const Map, Map, Map, FlagMap, FlagMap>
       update_;
   const BlockEvidence none_;
 };

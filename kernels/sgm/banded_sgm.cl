@@ -29,7 +29,7 @@
 //
 // banded_sgm_paths.cl has one form for all bands, path_together.h.
 //
-// Where the right view is read off the left one's sums, the sweep that finds the winners leaves at each right pixel the
+// If the right view comes from the left view's sums, the sweep that finds the winners leaves at each right pixel the
 // least rank of the left pixels that it may be (sgm_cells.h).
 
 #ifndef __ENDIAN_LITTLE__

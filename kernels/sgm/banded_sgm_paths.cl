@@ -66,7 +66,7 @@ KERNEL __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void follow_pa
   const Sums sums = {stage, vertical, backward ? backward_first : forward_first,
                      backward ? backward_second : forward_second};
   const int lane = get_local_id(0) % LANES;
-  // Of each vector the first cost and, in the upper 16 bits, the last; of this pixel and of the one before.
+  // Each vector's first cost and, in the upper 16 bits, its last; of this pixel and of the one before.
   local uint edges[2][LINES][SLOT];
   local uint minima[2][LINES][MINIMA];
   for (int i = lane; i < SLOT; i += LANES) edges[0][line][i] = edges[1][line][i] = ABSENT << 16 | ABSENT;

@@ -89,7 +89,7 @@ static inline void minima(const uchar16* v, uchar16* least) {
 }
 #endif
 
-// The same of vectors that hold two paths, a chunk of each.
+// Minima of vectors that hold two paths, a chunk of each.
 static inline void minima_of_chunks(const uchar16* v, uchar16* least) {
 #if PATHS == 8
   uchar16 of_four = min((uchar16)(v[0].s0123, v[0].s89ab, v[1].s0123, v[1].s89ab),
@@ -117,7 +117,7 @@ static inline uchar16 lanes_from(const int first) {
 #define absent_from(first) ((uchar16)(0))
 #endif
 
-// The same of a block.
+// The disparities of a block.
 static inline Block block_from(const int first) {
   return BLOCK_LANE >= (Block)((uchar)clamp(first, 0, BLOCK)) ? (Block)(ABSENT) : (Block)(0);
 }
@@ -130,7 +130,7 @@ static inline Block block_from(const int first) {
 // 65535 where a lane is 255; lanes are 0 or 255.
 static inline ushort16 widened(const uchar16 lanes) { return as_ushort16(convert_short16(as_char16(lanes))); }
 
-// As `mean_of` has it of blocks.
+// The mean as `mean_of` rounds it.
 static inline uchar16 mean(const uchar16 a, const uchar16 b) {
   return convert_uchar16((convert_ushort16(a) + convert_ushort16(b) + (ushort16)(1)) >> (ushort16)(1));
 }

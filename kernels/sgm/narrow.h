@@ -12,7 +12,7 @@ static inline uchar16 path_cost_from(global const uchar* from, const uchar16 cos
   return add_sat(cost, LEAST_WAY(load(from), load(from - 1), load(from + 1), p1, p2, min, add_sat));
 }
 
-// The same where they are at hand and nothing lies beside them.
+// The path cost where the predecessor's costs are at hand and nothing lies beside them.
 static inline uchar16 path_cost_beside(const uchar16 before, const uchar16 cost, const uchar16 p1, const uchar16 p2) {
   const uchar16 below = before.s00123456789abcde | (uchar16)(ABSENT, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0);
   const uchar16 above = before.s123456789abcdeff | (uchar16)(0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, ABSENT);

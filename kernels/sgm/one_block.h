@@ -19,7 +19,7 @@ ALWAYS_INLINE void follow_block(const SgmParameters q, const Row* row, const uin
   for (int n = 0; n < DIRECTIONS; ++n) {
     const uint moved = n > 0 ? place->moved : -(uint)q.min_disparity;
     global const uchar* from = row->slot[n] + (moved + (uint)origin);
-    // What was just stored is not read again a lane off, which stalls. Its minimum is still on it (see `FromLeft`).
+    // A load one lane off a recent store would stall. The cost's minimum is still on it (see `FromLeft`).
     const bool beside = n == 0 && extent == place->wiped[0];
     const Block below = beside ? LANES_BELOW(place->last_block) : load_block(from - 1);
     const Block above = beside ? LANES_ABOVE(place->last_block) : load_block(from + 1);

@@ -12,7 +12,7 @@ typedef struct {
   int x, y, length;
 } Line;
 
-// The same with its place in memory: first pixel (of both views), its column, its and its matches' codes, and what a
+// A path with its place in memory: first pixel (of both views), its column, its and its matches' codes, and what a
 // step adds to each. Indices have 32 bits, as the cells of so many pixels would fit no device; a step may wrap them
 // round.
 typedef struct {
@@ -26,7 +26,7 @@ typedef struct {
   int direction;
 } Path;
 
-// What lies in memory of all pixels.
+// The pixels' values in memory.
 typedef struct {
   global const Code* codes;
   global const uchar* penalties;
@@ -34,7 +34,7 @@ typedef struct {
   global const uint* offsets;
 } Pixels;
 
-// What memory holds of a pixel on it: P2 of the step to it, where its cells lie in their row, and its band, in one
+// The stored values of a pixel on a path: P2 of the step to it, where its cells lie in their row, and its band, in one
 // value (origin, chunks, first, last), as a struct in a struct goes through memory (PoCL 3.1).
 typedef struct {
   int p2;
@@ -102,7 +102,7 @@ static inline Stored stored_at(const Path path, const int i, const Pixels pixels
   Stored stored = {0, 0, 0};
   if (i < path.length) {
     const uint at = path.pixel + i * path.pixel_step;
-    // Where a path begins, any P2 gives the same.
+    // At the beginning of a path, any P2 gives the same.
     stored.p2 = pixels.penalties[4 * (size_t)(i > 0 ? at + path.penalty_offset : at) + path.direction];
     stored.band = ((global const short4*)pixels.bands)[at];
     stored.offset = pixels.offsets[at];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the paths leave of a pixel, and what is read off it (banded_sgm_paths.cl). OpenCL C only.
+// The path sums of a pixel, and its winner (banded_sgm_paths.cl). OpenCL C only.
 #ifndef EGOSGM_KERNELS_MATCH_PATH_SUMS_H
 #define EGOSGM_KERNELS_MATCH_PATH_SUMS_H
 
@@ -8,14 +8,15 @@
 #define MAX_STEPS 8
 #define NO_WINNER 0xffffffffu
 
-// Where a launch leaves the costs of its paths. `stage` 0: horizontal (and `vertical`) paths, 1 and 2: the diagonals.
+// The place where a launch leaves the costs of its paths. `stage` 0: horizontal (and `vertical`) paths, 1 and 2: the
+// diagonals.
 typedef struct {
   int stage;
   bool vertical;
   global uchar *first, *second;
 } Sums;
 
-// What lies in a vector of cells already.
+// The sums that lie in a vector of cells already.
 typedef struct {
   Bytes first, second;
 } Earlier;
@@ -57,7 +58,7 @@ static inline Totals totals_of(const Cells cells, const int at) {
   return TOTALS_OF(forward) + TOTALS_OF(backward);
 }
 
-// The same in the upper halves, the index in the lower ones, so that the smallest disparity wins a tie; NO_WINNER
+// Sums in the upper halves, the index in the lower ones, so that the smallest disparity wins a tie; NO_WINNER
 // outside of the band.
 static inline Ranks allowed_of(const Cells cells, const int at, const int first, const int last) {
   const Ranks index = (Ranks)((uint)at) + (Ranks)(INDEX);

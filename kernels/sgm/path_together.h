@@ -17,11 +17,12 @@
 #define UNROLLED
 #endif
 
-// Of so many lanes each looks at what all have, after one barrier; of more, a few look at eight each before it.
+// Up to this many lanes each read the minima of all, after one barrier; with more, a few lanes read eight each before
+// it.
 #define AT_ONCE 16
 #define MINIMA (LANES <= AT_ONCE ? LANES : 2 * LANES)
 
-// What a pixel needs: its code, those of what it may match (with COST_SAD the costs themselves), and what lies in its
+// Inputs of a pixel: its code, those of what it may match (with COST_SAD the costs themselves), and what lies in its
 // cells.
 typedef struct {
   Code own;
@@ -75,7 +76,7 @@ static inline void follow_together(const SgmParameters q, const Path path, const
                                    const Pixels memory, const Sums sums, local uint* edges, local uint* minima) {
   Costs costs[VECTORS_A_LANE];
   UNROLLED for (int v = 0; v < VECTORS_A_LANE; ++v) costs[v] = ABSENT;
-  // What a pixel needs is loaded while the one before is under way, its band one pixel earlier still, and nobody waits
+  // A pixel's inputs are loaded while the one before is under way, its band one pixel earlier still, and nobody waits
   // for it before then.
   Pixel pixel = pixel_of(q, path, 0, stored_at(path, 0, memory));
   Stored stored = stored_at(path, 1, memory);

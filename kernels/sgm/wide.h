@@ -24,7 +24,7 @@ typedef struct {
   global uint* seen;        // the rank of the right pixel at its first disparity; null: none are kept
 } Pixel;
 
-// What comes of it between its two passes: path costs before their minima are taken off, and matching costs.
+// Results between the two passes: path costs before their minima are taken off, and matching costs.
 typedef struct {
   Block t[DIRECTIONS][MAX_BLOCKS], cost[MAX_BLOCKS];
 } PathCosts;

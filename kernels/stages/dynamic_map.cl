@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What contradicts a static world, of the left view: pixels around which prediction and measurement differ.
+// Finds what contradicts a static world, in the left view: pixels around which prediction and measurement differ.
 #include "method.h"
 #include "pixels.h"
 

@@ -6,7 +6,7 @@
 // are much brighter or darker do not count, neither in the window nor in the codes at a quarter: they tell of another
 // surface, and its outline is seen from afar.
 //
-// What is asked is the prediction, at its own place, before anything was chosen there: a chosen match would be better
+// The test asks the prediction, at its own place, before anything was chosen there: a chosen match would be better
 // than chance in noise, too. Where there is none, or the measurement lies beyond the gate, it is the measurement.
 //
 // All is counted in whole numbers, EGOSGM_EVIDENCE_UNITS a bit.
@@ -77,7 +77,7 @@ static inline int beyond_eight(const Code own, volatile global const Code* match
   return beyond;
 }
 
-// What is asked of pixels.
+// The disparities that are tested.
 static inline Floats asked_of(const Floats predicted, const Floats measured, const float gate) {
   const Ints contradicted = (measured > INVALID) & (fabs(measured - predicted) > gate);
   return ((predicted > INVALID) & !contradicted) ? predicted : measured;
@@ -286,7 +286,7 @@ KERNEL void gather_evidence(const ImageSize size, const int has_coarse, const in
   gather_row(THIS_WORK_ITEM, size, has_coarse, coarse_padding, coarse, alike, sums, evidence, found);
 }
 
-// What is given out of a belief: what has much evidence, and what has little where confirmed pixels around lie on the
+// Publishes of a belief the pixels with much evidence, and those with little where confirmed pixels around lie on the
 // same surface. Where the left view alone is tracked (by_left), a right pixel has the evidence of the left pixel that
 // it sees, and must be confirmed itself.
 COMPILED_ONCE void publish_row(const WorkItem at, const ImageSize size, const int by_left,

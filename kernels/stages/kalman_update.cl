@@ -98,7 +98,7 @@ KERNEL void find_drift(const ImageSize size, global const int* sums, global cons
   drift_row(THIS_WORK_ITEM, size, sums, counts, drifts);
 }
 
-// What is known of the blocks of pixels x .. x + PIXELS - 1, each pixel what its own is.
+// Values of the blocks of pixels x .. x + PIXELS - 1: each pixel gets that of its own block.
 #if PIXELS == 1
 #define OF_ITS_BLOCK(Values, row, x) ((row)[(x) / EGOSGM_COARSE])
 #else
@@ -120,7 +120,7 @@ static inline Ints moved_evidence(const ImageSize size, const int x, const int y
   return own > 0 ? own : beside > 0 ? beside : around;
 }
 
-// What evidence says of pixels: their sums, which ones live, and which measurements count.
+// The verdict of evidence on pixels: their sums, which ones live, and which measurements count.
 typedef struct {
   Ints sums, lives, counts;
 } Verdict;
@@ -174,10 +174,10 @@ COMPILED_ONCE void update_row(const WorkItem at, const ImageSize size, const int
                               const int keep_predicted, const float min_variance, global const uchar* hidden,
                               global const float* predicted, global const float* predicted_variance,
                               global const float* measured, global const float* measured_variance,
-                              const int has_evidence, const int repeats,
-                              global const uchar* evidence_before, global const int* block_evidence,
-                              global const float* found, global const float* drifts, global float* updated,
-                              global float* updated_variance, global uchar* updated_doubtful, global uchar* evidence) {
+                              const int has_evidence, const int repeats, global const uchar* evidence_before,
+                              global const int* block_evidence, global const float* found, global const float* drifts,
+                              global float* updated, global float* updated_variance, global uchar* updated_doubtful,
+                              global uchar* evidence) {
   const int width = size.width;
   const int y = at.y;
   const size_t view = (size_t)at.view * size.height * width;
@@ -235,11 +235,11 @@ COMPILED_ONCE void update_row(const WorkItem at, const ImageSize size, const int
 KERNEL void update(const ImageSize size, const int has_gate, const float gate, const int keep_predicted,
                    const float min_variance, global const uchar* hidden, global const float* predicted,
                    global const float* predicted_variance, global const float* measured,
-                   global const float* measured_variance, const int has_evidence,
-                   const int repeats, global const uchar* evidence_before, global const int* block_evidence,
-                   global const float* found, global const float* drifts, global float* updated,
-                   global float* updated_variance, global uchar* updated_doubtful, global uchar* evidence) {
+                   global const float* measured_variance, const int has_evidence, const int repeats,
+                   global const uchar* evidence_before, global const int* block_evidence, global const float* found,
+                   global const float* drifts, global float* updated, global float* updated_variance,
+                   global uchar* updated_doubtful, global uchar* evidence) {
   update_row(THIS_WORK_ITEM, size, has_gate, gate, keep_predicted, min_variance, hidden, predicted, predicted_variance,
-             measured, measured_variance, has_evidence, repeats, evidence_before, block_evidence,
-             found, drifts, updated, updated_variance, updated_doubtful, evidence);
+             measured, measured_variance, has_evidence, repeats, evidence_before, block_evidence, found, drifts,
+             updated, updated_variance, updated_doubtful, evidence);
 }

@@ -57,8 +57,8 @@ COMPILED_ONCE void splat_row(const WorkItem at, const ImageSize size, const int 
     Ints keys_of[CHUNK], targets[CHUNK];
     FOR_BLOCKS(x, i, start, width) {
       const Bids own = bids_of(width, min_disparity, x, load_pixels(disparity + row, x, width));
-      // Of what lands on a pixel, that of two pixels or more to the left is smaller: written from left to right, what
-      // comes last is the nearest.
+      // A bid from two pixels or more to the left is smaller than one from beside: written from left to right, the bid
+      // that comes last is the nearest.
       const Bids left = bids_of(width, min_disparity, x - 1, load_pixels(disparity + row, x - 1, width));
       keys_of[i] = own.targets == left.targets ? max(own.keys, left.keys) : own.keys;
       targets[i] = own.targets;

@@ -19,7 +19,7 @@ from .rectification import StereoRig
 from .ros_images import BODY_FROM_OPTICAL, Cameras, are_raw, grey_of, is_set, needs, quaternion_of, rotation_of, stamp_ns
 
 _IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
-# What tells cameras apart in names of topics.
+# Words that tell cameras apart in names of topics.
 _SIDES = (("left", "right"), ("Left", "Right"), ("cam0", "cam1"), ("camera0", "camera1"), ("infra1", "infra2"), ("cam_0", "cam_1"),
           ("camera_0", "camera_1"), ("cam1", "cam2"), ("camera1", "camera2"), ("infra_1", "infra_2"), ("/0/", "/1/"), ("Infrared_1", "Infrared_2"))
 _MOST_INTERVALS = 1000  # the last ones, of both cameras

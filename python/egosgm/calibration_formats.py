@@ -288,7 +288,7 @@ def of_q(q: Matrix, file: pathlib.Path) -> _egosgm.Calibration:
 _MOST_AXIS_ERROR = 1e-3  # of a lens's axis, which moves its centre by as many focal lengths
 
 
-# How NumPy's users and others call the matrices of stereoCalibrate, and the numbers of a rectified pair (Cityscapes' in two groups), in small letters
+# Names that NumPy's users and others give the matrices of stereoCalibrate, and the numbers of a rectified pair (Cityscapes' in two groups), in small letters
 # without marks.
 _NAMES = {
     "left_matrix": r"(m|k|mtx|cam(era)?(mats?|matrix|matrices)|intrinsics?|cam)(l|left|1)|(l|left|1)(k|m|mtx|cam(era)?(mat|matrix)|intrinsics?)",

@@ -36,7 +36,7 @@ struct StereoSequence {
   std::filesystem::path times_file;  // when the frames were taken, empty where no file says so
 };
 
-/// What tells which left and right images belong together: equal texts in their names, or their order.
+/// The rule that pairs left and right images: equal texts in their names, or their order.
 enum class PairBy { kName, kOrder };
 
 /// Frame numbers first..last, both included. An open end takes what there is.

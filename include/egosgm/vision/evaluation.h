@@ -9,8 +9,8 @@
 
 namespace egosgm::vision {
 
-/// What comparing one disparity map with its truth counted, over pixels that have truth. Counts of several images add
-/// up (KITTI 2015 pools pixels); KITTI 2012 instead averages each image's figures (mean_of). `bad`: |error| > 3 px.
+/// Counts of a comparison of one disparity map with its truth, over pixels that have truth. Counts of several images
+/// add up (KITTI 2015 pools pixels); KITTI 2012 instead averages each image's figures (mean_of). `bad`: |error| > 3 px.
 /// `d1`: bad, and |error| > 5 % of the truth. `interpolated`: after interpolate_background. Where the truth says that
 /// nothing is there (is_sky), a hole is right: it is neither missing nor filled.
 struct EGOSGM_EXPORT DisparityCounts {
@@ -49,7 +49,7 @@ EGOSGM_EXPORT DisparityMetrics metrics_of(const DisparityCounts& counts);
 /// The mean of each image's figures, images whose figure is NaN left out (KITTI 2012).
 EGOSGM_EXPORT DisparityMetrics mean_of(const std::vector<DisparityMetrics>& images);
 
-/// Of OutputVariance: what is above is wrong about as often as what the background would fill in.
+/// A bound on OutputVariance: pixels above it are wrong about as often as those that the background would fill in.
 constexpr float kCertainVariancePx2 = 6.0f;
 
 /// Fills the holes from the background, as KITTI's development kit does: in each row, a run of invalid pixels between

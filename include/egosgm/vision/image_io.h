@@ -37,8 +37,8 @@ EGOSGM_EXPORT bool holds_8_bits_in_16(const Image& grey);
 /// Thread-safe.
 EGOSGM_EXPORT Size read_image_size(const std::filesystem::path& file);
 
-/// What the header of a PNG or JPEG says of its grey values; kU8 of anything else. Throws InvalidArgument where it
-/// cannot be read.
+/// Reads the type of grey values from the header of a PNG or JPEG; kU8 of anything else. Throws InvalidArgument where
+/// it cannot be read.
 EGOSGM_EXPORT PixelType read_pixel_type(const std::filesystem::path& file);
 
 /// Writes kU8, kBgr8 (BGR) or kU16, whole or not at all. Throws IoError, and InvalidArgument for another type

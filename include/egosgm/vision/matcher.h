@@ -18,7 +18,7 @@ namespace egosgm::vision {
 /// it is matched twice, first to find the vertical offset. Not thread-safe. Programs that use it link opencv_core.
 class Matcher : public cv::StereoMatcher {
  public:
-  /// What suits single pairs: the default options, with eight paths.
+  /// Options that suit single pairs: the default ones, with eight paths.
   static PipelineOptions single_pair();
 
   /// For single frames: `options.temporal` is taken as false, and no calibration is needed. Throws InvalidArgument
@@ -33,7 +33,7 @@ class Matcher : public cv::StereoMatcher {
   /// A rectified pair, grey or BGR, of 8 or 16 bits. `disparity` becomes CV_16SC1: 16 times the disparity, rounded;
   /// (min_disparity - 1) * 16 where there is none, as OpenCV has it. Throws InvalidArgument for other images.
   void compute(cv::InputArray left, cv::InputArray right, cv::OutputArray disparity) override;
-  /// The same of the next frame of a video.
+  /// Computes the map of the next frame of a video.
   void compute(cv::InputArray left, cv::InputArray right, cv::OutputArray disparity,
                const std::optional<Motion>& motion);
 
@@ -48,7 +48,7 @@ class Matcher : public cv::StereoMatcher {
   void setSpeckleWindowSize(int most_px) override;
   int getDisp12MaxDiff() const override;
   void setDisp12MaxDiff(int most_px) override;  ///< 0 or less: any difference.
-  /// Of the window that belongs to options().cost. Setting another one is refused: choose the cost.
+  /// The size of the window that belongs to options().cost. Setting another one is refused: choose the cost.
   int getBlockSize() const override;
   void setBlockSize(int side_px) override;
   /// 0: the method has its own. Setting another one is refused.
