@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/method_options.h"
 
+#include <algorithm>
+#include <limits>
+
 #include "host/option_text.h"
 
 namespace egosgm {
@@ -96,6 +99,7 @@ void choose_as_the_paper(MethodOptions& method) {
   method.edge_rejection.max_jump_px = 3.0f;
   method.consistency.checks_prediction = true;
   method.consistency.keep_unseen = false;
+  method.consistency.update_px = std::numeric_limits<float>::infinity();  // left_right_px counts
   method.search_band.from_neighbours = false;
   method.banded_sgm.p2_slope = 0;
   method.banded_sgm.right_row_step = 1;
@@ -121,7 +125,7 @@ void MethodOptions::give_options(PipelineOptions& options) const {
 MethodOptions::MethodOptions(const PipelineOptions& options) {
   if (options.preset == Preset::kPaper) choose_as_the_paper(*this);
   for_each_chosen(options, *this, [](const auto& option, auto& parameter) { parameter = option; });
-  consistency.update_px = options.left_right_px;
+  consistency.update_px = std::min(consistency.update_px, options.left_right_px);
   for (const auto& [name, value] : options.constants) set_parameter(*this, name, value);
 }
 

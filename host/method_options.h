@@ -26,7 +26,7 @@ struct HoleFillOptions {
   float max_difference_px = 1.0f;  // gamma (eqs. 7-8): neighbours that differ by less fill the gap between them
 };
 struct ConsistencyCheckOptions {
-  float measurement_px = 3.0f, update_px = 3.0f;  // largest left-right differences
+  float measurement_px = 3.0f, update_px = 2.0f;  // largest left-right differences
   float read_off_px = 1.45f;                      // of the measurement, where the right view is read off
   bool checks_prediction = false;  // the prediction is checked as the update is, where both views are tracked
   bool keep_unseen = true;         // of prediction and update: what the other camera cannot see stays
@@ -34,32 +34,32 @@ struct ConsistencyCheckOptions {
 struct CoarseMatchOptions {
   bool enabled = true;  // match at a quarter of the resolution too, so that what moves by itself is searched for
   int p1 = 6, p2 = 60, p2_at_edges = 40;  // as in BandedSgmOptions, for a census of 5x5 coarse pixels
-  float max_difference_px = 1.0f;         // of the left-right check, in coarse pixels
+  float max_difference_px = 1.5f;         // of the left-right check, in coarse pixels
 };
 struct SearchBandOptions {
   float sigmas = 2.0f;             // half-width of a predicted pixel's band, in standard deviations
-  float min_half_width_px = 2.5f;  // and at least this
+  float min_half_width_px = 3.0f;  // and at least this
   bool from_neighbours = true;     // unpredicted pixels search the range of the predictions around them
   int neighbour_min_count =
-      72;  // with fewer predictions than this in the 3x3 blocks around, an eighth, the whole range
+      144;  // with fewer predictions than this in the 3x3 blocks around, a quarter, the whole range
   float neighbour_margin_px = 4.0f;
   // A band is widened to what CoarseMatch found, and a margin, where that lies beyond it by more than the tolerance.
-  float coarse_tolerance_px = 2.0f, coarse_margin_px = 2.0f;
+  float coarse_tolerance_px = 3.0f, coarse_margin_px = 2.0f;
 };
 struct BandedSgmOptions {
   MatchingCost cost = MatchingCost::kCensus9x7;
   int paths = 4;  // 4 (horizontal and vertical) or 8
-  int p1 = 10;    // penalty of a step of one disparity
+  int p1 = 16;    // penalty of a step of one disparity
   // Penalty of a larger step between neighbours whose grey values (8 bits) differ by g: p2 - p2_slope * g, but not
   // below p2_at_edges (nor above p2).
-  int p2 = 170;  // p1 <= p2 <= 190
-  int p2_at_edges = 70, p2_slope = 2;
+  int p2 = 190;  // p1 <= p2 <= 190
+  int p2_at_edges = 40, p2_slope = 6;
   int right_row_step = 2;  // every so many-th row of the right view is matched in frames with a prediction
   // Matching variance r = floor + n (per_step + per_square n), n = n_l + n_r the steps to both sides until the (halved)
   // path sums above the minimum add up to s_max, at most 8 a side.
   int s_max = 80;
-  float variance_floor_px2 = 0.15f;
-  float variance_per_step_px2 = 0.1f, variance_per_square_px2 = 0.045f;
+  float variance_floor_px2 = 0.05f;
+  float variance_per_step_px2 = 0.05f, variance_per_square_px2 = 0.045f;
   Scheduling scheduling = Scheduling::kAutomatic;
   // Memory for the path sums. An image that needs more is matched in horizontal stripes that overlap by 32 rows, almost
   // as well (docs/understand/reliability.md). 0: what the device has.
@@ -77,14 +77,14 @@ struct SadCheckOptions {
   float max_difference = 0.0f;  // mean absolute grey difference of the 3x3 windows (8-bit scale); 0: no check
 };
 struct SpeckleRemovalOptions {
-  int max_size_px = 40;            // connected regions up to this size are dropped; 0: none
-  float max_difference_px = 2.0f;  // neighbours within this belong to one region
+  int max_size_px = 200;           // connected regions up to this size are dropped; 0: none
+  float max_difference_px = 1.0f;  // neighbours within this belong to one region
 };
 struct KalmanUpdateOptions {
   float gate_px = 3.0f;        // where prediction and measurement differ by more, the measurement is taken; 0: never
   bool keep_predicted = true;  // a prediction without a measurement stays, with its grown variance
   bool ask_neighbours = true;  // where most of them are off to one side, they move the prediction first
-  float min_variance_px2 = 0.02f;
+  float min_variance_px2 = 0.1f;
 };
 struct EvidenceOptions {
   bool enabled = true;  // what no evidence says is there dies, and what is not confirmed is not given out

@@ -53,7 +53,7 @@ void for_each(Options& o, Visit&& visit) {
                    "Raise it for smooth surfaces without texture; lower it for slanted ones."},
         o.p1);
   visit(OptionText{"p2", "Penalty of a larger step; it is lower where the image has an edge.", "cost", "0 to 190",
-                   "Raise it for noisy images; lower it if thin objects are lost."},
+                   "Lower it if thin objects are lost."},
         o.p2);
   visit(OptionText{"max_speckle_px",
                    "Connected regions of at most this size are dropped, in frames without a prediction.", "pixels",
@@ -118,6 +118,7 @@ PipelineOptions PipelineOptions::paper() {
   options.vertical_alignment = false;
   options.max_speckle_px = 0;
   options.cost = MatchingCost::kSad3x3;
+  options.p1 = 10;
   options.p2 = 120;
   return options;
 }

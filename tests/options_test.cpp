@@ -215,8 +215,8 @@ TEST(Options, RangesEndWhereTheyAreSaidTo) {
   const std::vector<std::pair<std::string, std::vector<std::string>>> allowed{{"disparities", {"1", "4096"}},
                                                                               {"min_disparity", {"-16384", "16384"}},
                                                                               {"paths", {"4", "8"}},
-                                                                              {"p1", {"0", "170"}},
-                                                                              {"p2", {"10", "190"}},
+                                                                              {"p1", {"0", "190"}},
+                                                                              {"p2", {"16", "190"}},
                                                                               {"max_memory_mib", {"0", "2147483647"}},
                                                                               {"max_speckle_px", {"0", "2147483647"}}};
   for (const auto& [name, values] : allowed) {
@@ -230,7 +230,7 @@ TEST(Options, RangesEndWhereTheyAreSaidTo) {
       {"disparities", {"0", "-1", "4097", "-2147483648"}},
       {"min_disparity", {"-16385", "16385", "2147483647", "-2147483648"}},
       {"paths", {"0", "1", "5", "16", "-8"}},
-      {"p1", {"-1", "171"}},
+      {"p1", {"-1", "191"}},
       {"p2", {"-1", "191"}},
       {"max_memory_mib", {"-1"}},
       {"max_speckle_px", {"-1"}}};

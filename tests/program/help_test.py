@@ -36,7 +36,7 @@ class Help(ProgramTest):
         text = self.assert_works("run", "--help")
         for option in ("--kitti", "--scene", "--odometry", "--left", "--right", "--calib", "--frames", "--out", "--poses", "--preset",
                        "--temporal", "--paths", "--disparities", "--min-disparity", "--device", "--tuning", "--interpolate",
-                       "--write", "--trace", "--resume", "--set", "--config", "--save-config", "--quiet", "p2 = 170", "gate_px = 3", "Raise it if near objects are cut off"):
+                       "--write", "--trace", "--resume", "--set", "--config", "--save-config", "--quiet", "p2 = 190", "gate_px = 3", "Raise it if near objects are cut off"):
             self.assertIn(option, text)
 
     def test_version(self):

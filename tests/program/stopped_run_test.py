@@ -431,7 +431,7 @@ class Resume(LongRuns):
         out = self.new_folder()
         run = ["run", "--odometry", self.street, "--out", out]
         self.assert_works(*run, "--frames", ":1", "--quiet")
-        self.assert_refused([*run, "--resume", "--set", "p2=99"], "p2", "170", "99")
+        self.assert_refused([*run, "--resume", "--set", "p2=99"], "p2", "190", "99")
         self.assert_refused([*run, "--resume", "--poses", self.street / "poses.txt"], "motion")
         self.assert_works(*run, "--resume")
         self.assertEqual(self.assert_whole(out), FRAMES)

@@ -289,7 +289,7 @@ class Parameters(unittest.TestCase):
         from rclpy.parameter import Parameter
         self.assert_runs_with(self.node(), "default")
         self.assert_runs_with(self.node(preset="paper"), "paper")
-        defaults = dict(p2=170, gate_px=3.0, coarse_match=True)  # as the default preset has them
+        defaults = dict(p2=190, gate_px=3.0, coarse_match=True)  # as the default preset has them
         node = self.node(preset="paper", **defaults)
         self.assert_runs_with(node, "paper", **defaults)
         node.set_parameters([Parameter("p2", value=120)])
@@ -297,8 +297,8 @@ class Parameters(unittest.TestCase):
         node = self.node()
         node.set_parameters([Parameter("preset", value="paper")])
         self.assert_runs_with(node, "paper")
-        node.set_parameters([Parameter("p2", value=170)])
-        self.assert_runs_with(node, "paper", p2=170)
+        node.set_parameters([Parameter("p2", value=190)])
+        self.assert_runs_with(node, "paper", p2=190)
 
     def test_a_parameter_is_not_set_where_it_would_change_nothing(self):
         from rclpy.parameter import Parameter
