@@ -34,6 +34,6 @@ foreach(kernel IN LISTS kernels)
     list(TRANSFORM defines PREPEND -D)
     add_test(NAME ${test}
              COMMAND ${EGOSGM_CLANG} -x cl -cl-std=CL1.2 -target spir64-unknown-unknown -Xclang -finclude-default-header
-                     -include ${preamble} -I ${PROJECT_SOURCE_DIR}/kernels -Wall -Wextra -Wno-unused-parameter -Werror ${defines} -fsyntax-only ${kernel})
+                     -include ${preamble} -I ${PROJECT_SOURCE_DIR}/kernels -I ${PROJECT_SOURCE_DIR}/kernels/sgm -Wall -Wextra -Wno-unused-parameter -Werror ${defines} -fsyntax-only ${kernel})
   endforeach()
 endforeach()

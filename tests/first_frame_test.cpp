@@ -117,7 +117,7 @@ TEST(Programs, AreBuiltTogether) {
       });
       ocl::Context context(any_device());
       Method method(context, kSize, standard().scene().calibration(), all, with_defaults({}, Device::select().info()));
-      method.prepare(type, {.reasons = true});
+      method.prepare(type, {Output::kReason});
       context.build();
       EXPECT_LE(context.builds(), 4);
     }

@@ -155,7 +155,7 @@ def violations(tree, data_dependent=frozenset()):
 
 def syntax_tree(file, defines=()):
     command = [CLANG, "-x", "cl", "-cl-std=CL1.2", "-target", "spir64-unknown-unknown", "-Xclang", "-finclude-default-header", "-Xclang",
-               "-fdeclare-opencl-builtins", "-I", str(KERNELS), "-I", str(KERNELS / "match"), "-I", str(KERNELS / "search"), *(f"-D{define}" for define in defines), "-Wno-everything", "-Xclang",
+               "-fdeclare-opencl-builtins", "-I", str(KERNELS), "-I", str(KERNELS / "sgm"), "-I", str(KERNELS / "stages"), *(f"-D{define}" for define in defines), "-Wno-everything", "-Xclang",
                "-ast-dump=json", "-fsyntax-only", str(file)]
     return json.loads(subprocess.run(command, check=True, capture_output=True, text=True, timeout=900).stdout)
 

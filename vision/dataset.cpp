@@ -68,7 +68,7 @@ CameraFolders find_cameras(const fs::path& folder, const CameraFolders& grey, co
 void add_frames(const fs::path& folder, const CameraFolders& cameras, const std::string& prefix, int digits,
                 FrameRange range, StereoSequence& sequence) {
   const auto names_in = [&](const std::string& camera) {
-    return NamePattern{folder / camera, prefix, "", Kind::kNumber, digits, true};
+    return NamePattern{folder / camera, prefix, "", Kind::kNumber, digits, true, {}};
   };
   const NamePattern left = names_in(cameras.left), right = names_in(cameras.right);
   const std::vector<NamedPair> pairs = pair_files(left, right, PairBy::kName);

@@ -23,7 +23,7 @@ Plan plan_of(const MethodOptions& options, std::optional<Unpredicted> why_no_bel
   plan.search = searches_bands ? Search::kBands : Search::kEverything;
   plan.tracked = options.track_right ? Views::kBoth : Views::kLeft;
   plan.matched = plan.predicts() ? plan.tracked : Views::kBoth;
-  plan.right_row_step = plan.predicts() && options.track_right ? options.banded_sgm.right_row_step : 1;
+  plan.right_row_step = plan.search == Search::kBands && options.track_right ? options.banded_sgm.right_row_step : 1;
   plan.matches = options.vertical_alignment.enabled && !knows_offset ? 2 : 1;
   plan.has_coarse_match = searches_bands && options.coarse_match.enabled;
   plan.repeats = repeats;

@@ -34,8 +34,9 @@ static inline void add_innovations(const Floats d, const Floats z, const float g
 
 // The innovations within the gate of blocks of EGOSGM_COARSE x EGOSGM_COARSE pixels, of every second row. A work-item a
 // block, or a row of them; rows have EGOSGM_EVIDENCE_STRIDE places.
-COMPILED_ONCE void sum_row(const WorkItem at, const ImageSize size, const float gate, global const float* predicted,
-                           global const float* measured, global int* sums, global int* counts) {
+COMPILED_ONCE void sum_innovations_of_row(const WorkItem at, const ImageSize size, const float gate,
+                                          global const float* predicted, global const float* measured, global int* sums,
+                                          global int* counts) {
   const int width = size.width, blocks_high = (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
   const int y = at.y * EGOSGM_COARSE, end = min(y + EGOSGM_COARSE, size.height);
   const size_t row_of_blocks = ((size_t)at.view * blocks_high + at.y) * EGOSGM_EVIDENCE_STRIDE(width);
@@ -63,7 +64,7 @@ COMPILED_ONCE void sum_row(const WorkItem at, const ImageSize size, const float 
 
 KERNEL void sum_innovations(const ImageSize size, const float gate, global const float* predicted,
                             global const float* measured, global int* sums, global int* counts) {
-  sum_row(THIS_WORK_ITEM, size, gate, predicted, measured, sums, counts);
+  sum_innovations_of_row(THIS_WORK_ITEM, size, gate, predicted, measured, sums, counts);
 }
 
 // The drift of blocks: the mean over a window of blocks, and 0 where few have both values, the mean is small, or less

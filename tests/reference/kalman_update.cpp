@@ -55,7 +55,7 @@ Estimate update(const KalmanUpdateOptions& options, float drift, const Estimate&
   const float z = measured.disparity, wide = kDoubtfulVariancePx2;
   if (!is_valid(predicted)) return measured;
   if (!contradict(options.gate_px, z, predicted.disparity)) {
-    return fuse({predicted.disparity + drift, predicted.variance}, measured);
+    return fuse({predicted.disparity + drift, predicted.variance, false}, measured);
   }
   return {z, std::max(measured.variance, wide), true};
 }
