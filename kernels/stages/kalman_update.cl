@@ -213,7 +213,9 @@ COMPILED_ONCE void update_row(const WorkItem at, const ImageSize size, const int
       const Floats zero = 0.0f;
       const Floats sum = p + r;
       const Floats gain = sum > zero ? p / sum : zero;
-      const Floats moved = d + drift;
+      // No farther than to the measurement, so that all stays in the range.
+      const Floats off = z - d, least_off = drift > 0.0f ? (off < drift ? off : drift) : (off > drift ? off : drift);
+      const Floats moved = d + (least_off * drift > 0.0f ? least_off : (Floats)(0.0f));
       const Floats fused = moved + gain * (z - moved);
       const Floats fused_variance = (1.0f - gain) * p;
 

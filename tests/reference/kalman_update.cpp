@@ -55,7 +55,8 @@ Estimate update(const KalmanUpdateOptions& options, float drift, const Estimate&
   const float z = measured.disparity, wide = kDoubtfulVariancePx2;
   if (!is_valid(predicted)) return measured;
   if (!contradict(options.gate_px, z, predicted.disparity)) {
-    return fuse({predicted.disparity + drift, predicted.variance, false}, measured);
+    const float off = z - predicted.disparity, least_off = drift > 0 ? std::min(off, drift) : std::max(off, drift);
+    return fuse({predicted.disparity + (least_off * drift > 0 ? least_off : 0), predicted.variance, false}, measured);
   }
   return {z, std::max(measured.variance, wide), true};
 }

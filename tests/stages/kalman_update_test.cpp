@@ -216,7 +216,8 @@ TEST(KalmanUpdate, MovesThePredictionOfWhatMovesByItself) {
     EXPECT_EQ(Window(sign * 0.5f, 20 + sign).middle(), drifted(sign * 0.5f, 20 + sign));
     EXPECT_EQ(Window(sign * 0.5f, 20 + sign).middle({.ask_neighbours = false}), drifted(0, 20 + sign));
     EXPECT_EQ(Window(sign * 0.5f, 20 + sign * 4).middle(), (Estimate{20 + sign * 4, kWide, true})) << "contradicted";
-    EXPECT_EQ(Window(sign * 26 / 256, 20).middle(), drifted(sign * 26 / 256, 20));
+    EXPECT_EQ(Window(sign * 26 / 256, 20 + sign).middle(), drifted(sign * 26 / 256, 20 + sign));
+    EXPECT_EQ(Window(sign * 0.5f, 20).middle().disparity, 20) << "no farther than to the measurement";
     EXPECT_EQ(Window(sign * 25 / 256, 20).middle(), drifted(0, 20)) << "too little";
   }
   EXPECT_EQ(Window(0.5f, 21).with(80, 20).middle(), drifted(0.3f, 21)) << "three fifths";
