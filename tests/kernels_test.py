@@ -19,6 +19,8 @@ import kernels  # noqa: E402
 
 LANES = 16  # of a vector of the kernels for CPUs
 VECTOR = re.compile(r"call _Z\d+\w+?Dv(\d+)_")  # a function of vectors
+OF_MEMORY = re.compile(r"call _Z\d+v(?:load|store)(\d+)\w*PU3AS1K?([a-z])")  # of global memory; Oclgrind counts no bytes of it
+BYTES = {"h": 1, "c": 1, "t": 2, "s": 2, "j": 4, "i": 4, "f": 4, "m": 8, "l": 8}
 ARITHMETIC = re.compile(r"f(add|sub|mul|div|cmp)|and|or|xor|shl|[al]shr|select")  # without what counts places and turns, too
 
 
@@ -123,6 +125,8 @@ def counts(program, arguments):
         elif counted := re.match(r" *(\d+) - (.*?)(?: \((\d+) bytes\))?$", line):
             _, sums = launches[-1]
             sums["bytes"] += int(counted[3]) if counted[2].endswith(" global") else 0
+            if memory := OF_MEMORY.match(counted[2]):
+                sums["bytes"] += int(counted[1]) * int(memory[1]) * BYTES[memory[2]]
             lanes = VECTOR.match(counted[2])
             sums["ops"] += int(counted[1]) * (int(lanes[1]) if lanes else LANES if ARITHMETIC.fullmatch(counted[2]) else 0)
         elif ends := re.match(r"frame (\w+) ", line):

@@ -122,7 +122,8 @@ void expect_report(const FrameReport& report, const reference::Frame& expected, 
   double searched = 0;
   const bool has_prediction = !expected.predicted.disparity.empty();
   const int views = has_prediction && !setting.options.track_right ? 1 : 2;
-  const int right_row_step = has_prediction ? setting.options.banded_sgm.right_row_step : 1;
+  const bool has_bands = has_prediction && setting.options.search != SearchMode::kFull;
+  const int right_row_step = has_bands ? setting.options.banded_sgm.right_row_step : 1;
   for (const reference::Pass& pass : expected.passes) {
     for (std::size_t i = 0; i < views * pixel_count(setting.size); ++i) {
       const int row = static_cast<int>(i / setting.size.width), right_row = row - setting.size.height;

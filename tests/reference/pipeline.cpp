@@ -175,7 +175,7 @@ Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOff
   pass.penalties = step_penalties(size_, values, images.bits, sgm);
   std::vector<std::uint16_t> grey = values;
   for (std::uint16_t& value : grey) value = static_cast<std::uint16_t>(value >> (images.bits - 8));
-  const int right_row_step = frame.predicted.disparity.empty() || reads_off ? 1 : sgm.right_row_step;
+  const int right_row_step = everything || reads_off ? 1 : sgm.right_row_step;
   pass.matched = banded_sgm(size_, range_, sgm, both, grey, pass.band.bands, reads_off, right_row_step);
   pass.smoothed = options_.median_filter.enabled ? median_filter(size_, false, pass.matched) : pass.matched;
   const ConsistencyCheckOptions& check = options_.consistency;
