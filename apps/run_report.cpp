@@ -125,6 +125,7 @@ void RunReport::add(const vision::VideoFrame& made, const HostTimes& times, cons
                              {"density", report.density},
                              {"vertical_offset_px", report.vertical_offset_px},
                              {"unpredicted", to_string(report.unpredicted)},
+                             {"repeated", report.repeated},
                              {"searched_everything", report.searched_everything},
                              {"odometry", odometry_json(made.motion)},
                              {"launches", report.launches},

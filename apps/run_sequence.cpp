@@ -34,6 +34,7 @@ constexpr const char* kNoCalibration =
 
 using Clock = std::chrono::steady_clock;
 std::string note_of(const FrameReport& report) {
+  if (report.repeated) return "  (repeated pictures)";
   if (!report.searched_everything && !report.unpredicted) return "";
   const std::string why =
       !report.unpredicted ? "searched everything" : fmt::format("no prediction: {}", to_string(report.unpredicted));
@@ -207,6 +208,7 @@ class Run {
       progress.note(
           fmt::format("frame {}: no motion ({}): searched the full range", frame.name, made.motion.odometry.reason));
     }
+    repeated_ += result.repeated;
     if (written.unstorable > 0 && !warned_of_range_) {
       warned_of_range_ = true;
       note(fmt::format(
@@ -236,6 +238,10 @@ class Run {
     if (sink_) sink_->end(finished);
     const std::string doubt = video_.doubt(), of_poses = video_.doubt_of_poses();
     const std::size_t told = notes_.size();
+    if (repeated_ > 0) {
+      notes_.push_back(fmt::format("{} the pictures of the frame before: the camera is taken to stand there",
+                                   repeated_ == 1 ? "1 frame repeats" : counted(repeated_, "frame") + " repeat"));
+    }
     for (std::string& of_feed : source_.notes()) notes_.push_back(std::move(of_feed));
     report_.set_doubt(doubt.empty() || of_poses.empty() ? doubt + of_poses : doubt + "; " + of_poses, notes_);
     if (has_folder() && sequence_.has_calibration && !poses_.empty())
@@ -305,6 +311,7 @@ class Run {
   std::vector<Eigen::Isometry3d> poses_;
   std::string summary_;
   std::vector<std::string> notes_;
+  int repeated_ = 0;  // frames
   bool warned_of_range_ = false, warned_of_depth_ = false;
 };
 

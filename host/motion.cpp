@@ -24,4 +24,14 @@ void Motion::validate() const {
   }
 }
 
+Motion operator*(const Motion& second, const Motion& first) {
+  const Eigen::Matrix3d rotation = second.current_from_previous.linear();
+  const Eigen::Vector3d t = second.current_from_previous.translation();
+  const Eigen::Matrix3d cross = (Eigen::Matrix3d() << 0, -t.z(), t.y(), t.z(), 0, -t.x(), -t.y(), t.x(), 0).finished();
+  Eigen::Matrix<double, 6, 6> adjoint;
+  adjoint << rotation, cross * rotation, Eigen::Matrix3d::Zero(), rotation;
+  return {second.current_from_previous * first.current_from_previous,
+          second.covariance + adjoint * first.covariance * adjoint.transpose()};
+}
+
 }  // namespace egosgm

@@ -194,13 +194,17 @@ py::list stages_of(const FrameReport& report) {
 
 void bind_frame(py::module_& module) {
   auto report = py::class_<FrameReport>(module, "FrameReport", "What happened in a frame.");
-  pickle_members<&FrameReport::unpredicted, &FrameReport::searched_everything, &FrameReport::search_fraction,
-                 &FrameReport::predicted_fraction, &FrameReport::density, &FrameReport::vertical_offset_px,
-                 &FrameReport::launches, &FrameReport::stripes, &FrameReport::stages, &FrameReport::total_ms>(report);
+  pickle_members<&FrameReport::unpredicted, &FrameReport::repeated, &FrameReport::searched_everything,
+                 &FrameReport::search_fraction, &FrameReport::predicted_fraction, &FrameReport::density,
+                 &FrameReport::vertical_offset_px, &FrameReport::launches, &FrameReport::stripes, &FrameReport::stages,
+                 &FrameReport::total_ms>(report);
   report
       .def_property_readonly(
           "unpredicted", [](const FrameReport& report) { return to_string(report.unpredicted); },
           "Why nothing was predicted: 'first frame', 'reset', 'no motion' or 'not temporal'; '' where something was.")
+      .def_readonly("repeated", &FrameReport::repeated,
+                    "The pair is that of the frame before: the camera is taken to stand, and the motion counts for the "
+                    "next one.")
       .def_readonly("searched_everything", &FrameReport::searched_everything,
                     "The whole range at every pixel: without a prediction, or not trusting it.")
       .def_readonly("search_fraction", &FrameReport::search_fraction,

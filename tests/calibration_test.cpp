@@ -120,5 +120,30 @@ TEST(Motion, RefusesWhatIsNoCovariance) {
   expect_refused([&] { motion.validate(); }, {"motion: the covariance is not symmetric"});
 }
 
+// A small motion exp(xi) after the first one of two is a small one after both: T2 exp(xi) T1 = exp(xi') T2 T1.
+TEST(Motion, AddsThePerturbationsOfTwo) {
+  constexpr double kSmall = 1e-6;
+  Motion first = turned(0.2), second = turned(-0.7);
+  first.current_from_previous.pretranslate(Eigen::Vector3d(0.5, -2, 3));
+  second.current_from_previous.pretranslate(Eigen::Vector3d(4, 1, -2));
+  const Eigen::Matrix<double, 6, 1> xi = (Eigen::Matrix<double, 6, 1>() << 1, -2, 3, 0.5, 2, -1).finished();
+  first.covariance = xi * xi.transpose();
+  second.covariance(2, 2) = 7;
+  const Motion both = second * first;
+
+  Eigen::Isometry3d small = Eigen::Isometry3d::Identity();
+  const Eigen::Vector3d turn = kSmall * xi.tail<3>();
+  small.linear() = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
+  small.translation() = kSmall * xi.head<3>();
+  const Eigen::Isometry3d after =
+      second.current_from_previous * small * second.current_from_previous.inverse(Eigen::Isometry);
+  EXPECT_TRUE((after * both.current_from_previous)
+                  .isApprox(second.current_from_previous * small * first.current_from_previous, 1e-12));
+  const Eigen::AngleAxisd turned_by(after.rotation());
+  Eigen::Matrix<double, 6, 1> moved;
+  moved << after.translation() / kSmall, turned_by.axis() * turned_by.angle() / kSmall;
+  EXPECT_TRUE(both.covariance.isApprox(moved * moved.transpose() + second.covariance, 1e-4)) << both.covariance;
+}
+
 }  // namespace
 }  // namespace egosgm

@@ -26,6 +26,11 @@ void pack(const ImageView& left, const ImageView& right, std::vector<cl_uchar>& 
   }
 }
 
+/// `motion` from the last frame, as one from the images of the belief.
+std::optional<Motion> since_images(const Belief& belief, const std::optional<Motion>& motion) {
+  return motion ? std::optional(*motion * belief.since) : std::nullopt;
+}
+
 }  // namespace
 
 ocl::Context context_on(const Device::Handle& device) {
@@ -89,9 +94,12 @@ void FrameQueue::submit(const ImageView& left, const ImageView& right, const std
   FrameUnderWay frame{&free_transfer(), belief_, free_memory(), {}, {}, Clock::now()};
   ocl::Drain drain{context_};
   release_results();
-  if (Evidence::is_of(method_options_)) pack(left, right, *frame.after.images);
-  const bool repeats = !belief_.images->empty() && *belief_.images == *frame.after.images;
-  Plan plan = plan_of(method_options_, belief_.why_not, belief_.offset.is_known, motion, wanted, repeats);
+  if (method_options_.temporal) pack(left, right, *frame.after.images);
+  const bool repeats = motion && !belief_.why_not && !belief_.images->empty() && *belief_.images == *frame.after.images;
+  const std::optional<Motion> moved = since_images(belief_, motion);
+  frame.after.since = repeats ? *moved : Motion();
+  Plan plan =
+      plan_of(method_options_, belief_.why_not, belief_.offset.is_known, repeats ? Motion() : moved, wanted, repeats);
   if (wanted.has(Output::kReason)) plan.grey_step = levels_of(left, right).step();
   const FrameImages& images = frame.transfer->upload(left, right);
   if (under_way() > 0) context_.let_wait(ocl::Queue::kKernels, under_way_.back().transfer->scratch_fetched());
@@ -112,6 +120,7 @@ void FrameQueue::submit(const ImageView& left, const ImageView& right, const std
   drain.is_dismissed = true;
   frame.report.stripes = static_cast<int>(method_.matcher().banded_sgm().stripes().size());
   frame.report.unpredicted = plan.why_not;
+  frame.report.repeated = repeats;
   frame.commands = context_.take_commands();
   belief_ = frame.after;
   under_way_.push_back(std::move(frame));
@@ -127,8 +136,10 @@ DeviceMaps FrameQueue::enqueue(const FrameImages& images, const std::optional<Mo
   release_results();
   Wanted wanted = kOnDevice;
   if (wants_dynamic) wanted.add(Output::kDynamic);
-  const Plan plan = plan_of(method_options_, belief_.why_not, belief_.offset.is_known, motion, wanted);
+  const Plan plan =
+      plan_of(method_options_, belief_.why_not, belief_.offset.is_known, since_images(belief_, motion), wanted);
   after.images->clear();
+  after.since = Motion();
   const StereoMaps result = method_.frame(plan, images, belief_, after, transfer.given_out()).given_out;
   const cl::Event end = done ? context_.end_of_recorded() : cl::Event();
   context_.flush();

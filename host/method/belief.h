@@ -17,6 +17,7 @@ struct Belief {
   FlagMap evidence;  // of each pixel (kernels/method.h); what has enough of it is given out
   VerticalOffset offset;
   std::shared_ptr<std::vector<cl_uchar>> images;  // that it is of, both views; empty where the host does not know them
+  Motion since;  // of the camera, since its images: where they repeat, no motion counts yet
   std::optional<Unpredicted> why_not = Unpredicted::kFirstFrame;  // there are no maps
 
   /// Starts empty.

@@ -62,6 +62,7 @@ struct DeviceCommand {
 /// has 2, and a D that fills no whole chunks more.
 struct FrameReport {
   std::optional<Unpredicted> unpredicted;  // why nothing was predicted
+  bool repeated = false;                   // images of the frame before: the motion counts for the next one
   bool searched_everything = false;        // the whole range at every pixel: without a prediction, or not trusting it
   double search_fraction = 0;              // see above
   double predicted_fraction = 0;           // left pixels with a prediction

@@ -21,4 +21,7 @@ struct EGOSGM_EXPORT Motion {
   void validate() const;
 };
 
+/// The motion `first`, and `second` after it; their covariances are added.
+EGOSGM_EXPORT Motion operator*(const Motion& second, const Motion& first);
+
 }  // namespace egosgm

@@ -37,7 +37,8 @@ class EGOSGM_EXPORT Pipeline {
   void prepare(PixelType type, const FrameOutputs& outputs);
 
   /// Matches one rectified pair, both images of the same type, and fills `outputs`.
-  /// `motion`: how the camera moved since the last frame that was processed; none: the whole range is searched.
+  /// `motion`: how the camera moved since the last frame that was processed; none: the whole range is searched. Images
+  /// that equal those of the last frame are of the same moment: the motion given with them counts for the next frame.
   /// Throws InvalidArgument before anything is enqueued, or DeviceError. A frame that throws leaves the pipeline as it
   /// was, so the next one gives the bits that it would have given.
   FrameReport process(const ImageView& left, const ImageView& right, const std::optional<Motion>& motion,

@@ -145,13 +145,13 @@ static inline Verdict judged(const int repeats, const Ints before, const Ints no
   // A measurement without evidence contradicts nothing: the prediction stays, and was not asked.
   const Ints falls_back = has_prediction & !stays & (sums < 0);
   sums = falls_back ? kept - EGOSGM_EVIDENCE_OF_NOISE : sums;
-  const Ints is_old = (Ints)(repeats ? -1 : 0);
-  sums = is_old ? (has_prediction ? before : (Ints)(-1)) : sums;
+  const Ints is_old = has_prediction & (Ints)(repeats ? -1 : 0);
+  sums = is_old ? before : sums;
   Verdict verdict;
   verdict.lives = (has_prediction | has_measurement) & (sums >= 0);
   verdict.sums = verdict.lives ? sums : (Ints)(0);
   verdict.counts = (!stays & !falls_back) | (stays & (now >= EGOSGM_EVIDENCE_OF_NOISE));
-  verdict.counts = (has_prediction & is_old) ? (Ints)(0) : verdict.counts;
+  verdict.counts = is_old ? (Ints)(0) : verdict.counts;
   return verdict;
 }
 

@@ -195,6 +195,25 @@ class Run(ProgramTest):
         self.assert_works("run", "--odometry", self.street, "--out", out, "--interpolate", "--frames", "0")
         self.assertTrue((out / "interpolated/000000.png").exists())
 
+    def test_pictures_that_repeat_are_told_and_taken_as_one_moment(self):
+        """Of frame 1 three times, with poses between those of frames 1 and 2: its map stays, and frame 2 is as it is without."""
+        street, out = self.new_folder(), self.new_folder()
+        shutil.copytree(self.street, street, dirs_exist_ok=True)
+        poses = (street / "poses.txt").read_text().splitlines()
+        for side in ("image_0", "image_1"):
+            for file in (street / side).iterdir():
+                file.unlink()
+            for target, source in enumerate((0, 1, 1, 1, 2)):
+                shutil.copy(self.street / f"{side}/{source:06d}.png", street / f"{side}/{target:06d}.png")
+        (street / "given.txt").write_text("\n".join(poses[i] for i in (0, 1, 2, 0, 2)) + "\n")
+        told = self.assert_works("run", street, "--poses", street / "given.txt", "--out", out)
+        self.assertIn("2 frames repeat the pictures of the frame before", told)
+        frames = self.report(out)["frames"]
+        self.assertEqual([frame["repeated"] for frame in frames], [False, False, True, True, False])
+        for frame in frames[2:]:
+            self.assertGreater(frame["density"], frames[1]["density"] - 0.02)
+            self.assertFalse(frame["searched_everything"])
+
     def test_same_bits_twice_and_quiet_says_nothing(self):
         first, second = self.new_folder(), self.new_folder()
         for out in (first, second):

@@ -128,7 +128,7 @@ Verdict judge(shared::ImageSize size, float gate_px, const FrameEvidence& frame,
   int before = moved(x, y);
   if (before == 0) before = std::min(moved(x - 1, y), moved(x + 1, y));
   if (before == 0) before = std::min(moved(x, y - 1), moved(x, y + 1));
-  if (frame.repeats) return {before, is_valid(predicted), !is_valid(predicted)};
+  if (frame.repeats && is_valid(predicted)) return {before, true, false};
 
   const int columns = (size.width + kSide - 1) / kSide, rows = (size.height + kSide - 1) / kSide;
   const std::size_t block = (static_cast<std::size_t>(view) * rows + y / kSide) * columns + x / kSide;
