@@ -14,6 +14,7 @@
 #include "vision/file_io.h"
 #include "vision/file_kinds.h"
 #include "vision/frame_panels.h"
+#include "vision/frame_source.h"
 #include "vision/image_pairs.h"
 
 namespace egosgm::python {
@@ -68,10 +69,10 @@ void bind_sequences(py::module_& module) {
           "size",
           [](StereoSequence images) {
             images.calibrated_width = 0;  // whoever takes the calibration, too, calls _expect_calibrated
-            const auto size = vision::check_image_sizes(images);
+            const vision::Size size = vision::FileSource(std::move(images)).size();
             return py::make_tuple(size.width, size.height);
           },
-          "(width, height) of all images.")
+          "(width, height) of all images. Reads a pair: the headers of files that hold no more are not believed.")
       .def("__len__", [](const StereoSequence& s) { return s.frames.size(); });
 
   module.def(

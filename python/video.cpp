@@ -20,7 +20,7 @@ namespace {
 class Video {
  public:
   Video(const py::object& pipeline, int width, int height, const std::optional<Calibration>& calibration,
-        const std::optional<vision::StereoSequence>& sequence, const py::object& outputs, int lag, bool finds_motion,
+        std::optional<vision::StereoSequence> sequence, const py::object& outputs, int lag, bool finds_motion,
         const py::kwargs& odometry)
       : keep_pipeline_(pipeline),
         width_(width),
@@ -28,7 +28,10 @@ class Video {
         wanted_(outputs),
         motions_(finds_motion ? calibration : std::nullopt, odometry_options_of(odometry)) {
     const py::gil_scoped_release other_threads_run;
-    if (sequence) source_.emplace(*sequence);
+    if (sequence) {
+      sequence->calibrated_width = 0;  // of a calibration that may not be the one that is given
+      source_.emplace(std::move(*sequence));
+    }
     video_.emplace(motions_, pipeline_of(pipeline),
                    vision::StereoVideoOptions{.calibration = calibration,
                                               .outputs = [this] { return make_outputs(); },
@@ -128,7 +131,7 @@ void bind_video(py::module_& module) {
       py::arg("image"));
   py::class_<Video>(module, "_Video")
       .def(py::init<const py::object&, int, int, const std::optional<Calibration>&,
-                    const std::optional<vision::StereoSequence>&, const py::object&, int, bool, const py::kwargs&>(),
+                    std::optional<vision::StereoSequence>, const py::object&, int, bool, const py::kwargs&>(),
            py::arg("pipeline"), py::arg("width"), py::arg("height"), py::arg("calibration"), py::arg("sequence"),
            py::arg("outputs"), py::arg("lag"), py::arg("finds_motion"))
       .def_property_readonly("wants_pair", &Video::wants_pair)

@@ -43,10 +43,11 @@ class Bounds(ProgramTest):
         plain.write_bytes(png(side, side, 8, [bytes(side)] * 64))
         self.assert_bounded(plain, "eval", "--estimate", plain, "--truth", plain, says="too short")
         calib = self.street / "calib.txt"
-        self.assert_bounded(file, "run", "--left", file, "--right", file, "--calib", calib, "--out", self.folder / "never", says="bomb.png")
-
         other = file.parent / "other.png"
         other.write_bytes(file.read_bytes())
+        self.assert_bounded(file, "run", file, other, "--out", self.folder / "never", says="bomb.png")
+        self.assert_bounded(file, "doctor", "--left", file, "--right", other, "--calib", calib, says="too short")
+        self.assert_bounded(file, "run", "--left", file, "--right", file, "--calib", calib, "--out", self.folder / "never", says="bomb.png")
         self.assert_bounded(file, "rectify", "--left", file, "--right", other, "--calib", calib, "--out", self.new_folder() / "out", says="too short")
 
     def test_headers_of_large_images(self):
@@ -60,6 +61,8 @@ class Bounds(ProgramTest):
                 with self.subTest(left=left, command=command[0]):
                     self.assert_bounded(folder / "header.png" if left == "header.png" else folder / "other.png", *command, "--left", folder / left, "--right",
                                         folder / "other.png", "--calib", self.street / "calib.txt", "--out", folder / "never", says="1 of 1 pair could not be read")
+        self.assert_bounded(folder / "header.png", "doctor", "--left", folder / "header.png", "--right", folder / "other.png", "--calib", self.street / "calib.txt",
+                            says="not a readable image")
 
     def test_the_largest_map_that_a_small_file_may_hold(self):
         file = self.new_folder() / "flat.png"

@@ -490,6 +490,18 @@ def test_a_cloud_has_the_points_that_are_sure(tmp_path):
     assert np.frombuffer((tmp_path / "plain.ply").read_bytes()[-24:], np.float32).tolist() == [1, 2, 3, 0, 0, -1]
 
 
+def test_the_size_that_a_calibration_is_of_counts_where_that_one_is_taken(street, frames, tmp_path):
+    c = street.calibration
+    for name, image in (("im0", frames[0].left), ("im1", frames[0].right)):
+        egosgm.write_disparity(tmp_path / f"{name}.png", image.astype(np.float32))
+    camera = f"[{c.fx} 0 {c.cx}; 0 {c.fy} {c.cy}; 0 0 1]"
+    (tmp_path / "calib.txt").write_text(f"cam0={camera}\ncam1={camera}\ndoffs=0\nbaseline=540\nwidth=800\nheight=600\nndisp=64\n")
+    with pytest.raises(egosgm.InvalidArgument, match="is of images of 800x600"):
+        egosgm.run(tmp_path)
+    sequence = egosgm.open_folder(tmp_path)
+    assert len(list(egosgm.run(sequence, c, progress=False, **OPTIONS))) == 1
+
+
 @pytest.mark.filterwarnings("error")
 def test_what_is_no_map_makes_no_cloud_and_no_depth(tmp_path):
     camera = egosgm.Calibration(100, 100, 1, 1, 0.5)

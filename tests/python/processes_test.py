@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Threads that begin at once, forked processes, and the interpreter's end: each in a process of its own."""
+"""Threads that begin at once, forked processes, the interpreter's end, and peaks of memory: each in a process of its own."""
+import re
+import struct
 import subprocess
 import sys
+import zlib
 
 import pytest
 
@@ -165,3 +168,35 @@ in_threads(work, 1, daemon=True)
 begun.wait()
 at_end.append(lambda: ended or os.write(2, b"ended in the middle of a call"))
 """)
+
+
+def png(width, height, bits, colour, **chunks):
+    chunks = dict(IHDR=struct.pack(">IIBBBBB", width, height, bits, colour, 0, 0, 0), **chunks, IEND=b"")
+    return b"\x89PNG\r\n\x1a\n" + b"".join(struct.pack(">I", len(data)) + name.encode() + data + struct.pack(">I", zlib.crc32(name.encode() + data))
+                                           for name, data in chunks.items())
+
+
+# SECURITY.md: a refused file below 64 KiB takes less than 256 MiB. What the node and bags decode goes through grey_of.
+@pytest.mark.parametrize("read", ["egosgm.read_grey(file)", "egosgm.read_color(file)", "egosgm.read_disparity(file)", "egosgm.open_folder(folder).size",
+                                  "list(egosgm.run(folder, progress=False))",
+                                  'egosgm.ros_images.grey_of(types.SimpleNamespace(format="png", data=open(file, "rb").read()))'])
+@pytest.mark.parametrize("bomb", [png(8192, 4096, 8, 0, IDAT=zlib.compress(b"")), png(16384, 16384, 1, 3, PLTE=bytes(6), IDAT=zlib.compress(bytes(16384 * 2049), 9))],
+                         ids=["header alone", "palette of one bit"])
+def test_a_small_file_that_says_a_huge_size_takes_little_memory(tmp_path, bomb, read):
+    assert len(bomb) < 65536
+    for side in (0, 1):
+        (tmp_path / f"image_{side}").mkdir()
+        (tmp_path / f"image_{side}/000000.png").write_bytes(bomb)
+    (tmp_path / "calib.txt").write_text("P0: 100 0 50 0 0 100 50 0 0 0 1 0\nP1: 100 0 50 -50 0 100 50 0 0 0 1 0\n")
+    said = run(f"""
+import types
+import egosgm.ros_images
+folder, file = {str(tmp_path)!r}, {str(tmp_path / "image_0/000000.png")!r}
+try:
+    {read}
+except egosgm.InvalidArgument as error:
+    print(error)
+print(open("/proc/self/status").read())  # the peak of this program alone; ru_maxrss is no less than what its parent had
+""")
+    assert "too short" in said
+    assert int(re.search(r"VmHWM:\s+(\d+) kB", said)[1]) / 1024 < 256
