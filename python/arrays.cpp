@@ -19,7 +19,7 @@ std::string shape_of(const py::array& array) {
 
 py::array as_array(const py::object& object, const std::string& name, const char* wanted) {
   py::array array = object.is_none() ? py::array() : py::array::ensure(object);
-  if (object.is_none() || !array) {
+  if (object.is_none() || !array || array.ndim() == 0) {
     PyErr_Clear();
     throw InvalidArgument(name + " is no array: give " + wanted);
   }

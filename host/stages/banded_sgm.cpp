@@ -112,11 +112,15 @@ int rows_at_once(const ocl::Context& context, shared::ImageSize size, shared::Di
   const int fewest = std::min(size.height, least);
   const std::uint64_t needed = demand(context, {size.width, fewest}, range, options, chunks).total +
                                (fewest < size.height ? StripeMemory::bytes(size.width, fewest, words) : 0);
+  const std::string limit = chosen > 0 && chosen < device_limit
+                                ? "max_memory_mib allows " + std::to_string(chosen >> 20) + " MiB"
+                                : "three quarters of the device are " + std::to_string(memory >> 20) +
+                                      " MiB, of which maps of " + std::to_string(size.width) + "x" +
+                                      std::to_string(size.height) + " leave " + std::to_string(device_limit >> 20) +
+                                      " MiB";
   throw DeviceError(CL_MEM_OBJECT_ALLOCATION_FAILURE,
                     "BandedSgm: a stripe of " + std::to_string(fewest) + " rows needs " +
-                        std::to_string((needed >> 20) + 1) + " MiB, " +
-                        (chosen > 0 && chosen < device_limit ? "max_memory_mib allows " : "the device has left ") +
-                        std::to_string(total_limit >> 20) + " MiB and buffers of at most " +
+                        std::to_string((needed >> 20) + 1) + " MiB, " + limit + " and buffers of at most " +
                         std::to_string(context.max_allocation_bytes() >> 20) +
                         " MiB: choose fewer disparities, a smaller image or another device");
 }

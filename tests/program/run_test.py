@@ -498,6 +498,10 @@ class Limits(ProgramTest):
                             code=1)
         least = int(re.search(r"needs (\d+) MiB", egosgm(*run, "max_memory_mib=3").stderr)[1])
         self.assert_works(*run, f"max_memory_mib={least}")
+        for name in ("a.png", "b.png"):
+            (folder / name).write_bytes(grey_png(4096, 3000))
+        self.assert_refused(["run", folder / "a.png", folder / "b.png", "--out", self.new_folder() / "out"],
+                            "three quarters of the device are 768 MiB, of which maps of 4096x3000 leave 0 MiB", "a smaller image", code=1, env=gigabyte)
 
     def test_stripes_are_almost_as_good(self):
         street, bad = self.new_folder(), {}

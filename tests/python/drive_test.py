@@ -187,7 +187,8 @@ def test_what_is_wrong_is_said_before_a_frame_is_read(street_folder):
 def test_what_is_no_pair_and_no_calibration_is_said(street, frames):
     with pytest.raises(egosgm.InvalidArgument, match="calibration: is a tuple: give an egosgm.Calibration"):
         egosgm.run([], (700, 700, 320, 240, 0.1))
-    for source, named in (([frames[0].left], "pair 0: is a ndarray"), ([(frames[0].left, frames[0].right), (frames[0].left,)], "pair 1: is a tuple")):
+    for source, named in (([frames[0].left], "pair 0: is a ndarray"), ([(frames[0].left, frames[0].right), (frames[0].left,)], "pair 1: is a tuple"),
+                          ([(frames[0].left, None)], "right is no array")):
         with pytest.raises(egosgm.InvalidArgument, match=named):
             list(egosgm.run(source, street.calibration, **OPTIONS))
 
