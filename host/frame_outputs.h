@@ -62,8 +62,7 @@ void for_each_output(Outputs& outputs, Visit&& visit) {
       debug.measured_variance);
   row(Output::kSearchWidth, "search_width", "search", "", "how many disparities could win at the pixel",
       debug.search_width);
-  row(Output::kDynamic, "dynamic", "dynamic", "",
-      "255 where prediction and measurement contradict each other, as on what moves by itself; else 0", debug.dynamic);
+  row(Output::kDynamic, "dynamic", "dynamic", "", "255 where something moves by itself; else 0", debug.dynamic);
 }
 
 inline std::vector<OutputText> output_texts() {

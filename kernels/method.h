@@ -103,11 +103,39 @@
 #define EGOSGM_LEAST_DRIFT_PX 0.1f
 #define EGOSGM_DRIFT_STEPS_PER_PX 256.0f
 
-// DynamicMap looks at every second pixel this far to all sides: 25. It believes so many of them that have a prediction
-// and a measurement: a third.
-#define EGOSGM_DYNAMIC_RADIUS 4
-#define EGOSGM_DYNAMIC_STEP 2
-#define EGOSGM_DYNAMIC_MIN_COUNT 9
+// DynamicMap asks images at a half, a quarter and an eighth of the resolution, in blocks of 2x2 of their pixels: so
+// many pixels of the image a side. It asks so many places a side around the one to which the camera's motion leads;
+// that one lies from number CENTRE on and before the next.
+#define EGOSGM_DYNAMIC_BLOCK 4
+#define EGOSGM_DYNAMIC_MAX_BLOCK 16
+#define EGOSGM_DYNAMIC_PLACES 8
+#define EGOSGM_DYNAMIC_CENTRE 3
+// Costs are bits of a code of 24, of the four pixels of a block and of the 3x3 blocks around. The best place is another
+// one where it costs so many half bits a pixel less than the camera's, and so many tenths of that at most.
+#define EGOSGM_DYNAMIC_GAIN_HALF_BITS 5
+#define EGOSGM_DYNAMIC_RATIO_TENTHS 7
+// A hidden place counts as if it cost no more than HIDDEN bits. A place that looks different costs DIFFERENT at least.
+#define EGOSGM_DYNAMIC_HIDDEN_BITS 5
+#define EGOSGM_DYNAMIC_DIFFERENT_BITS 7
+// Places are known to sixteenths. At half of the resolution the best place lies 0.8 off at least; LEAST_SQUARE is the
+// square of that. So many of 3x3 blocks agree in their best places, to 1.5 in x and y.
+#define EGOSGM_DYNAMIC_FINENESS 16
+#define EGOSGM_DYNAMIC_LEAST_SQUARE 164
+#define EGOSGM_DYNAMIC_AGREES 24
+#define EGOSGM_DYNAMIC_VOTES 6
+// The last map tells what was hidden and what is new by so many pixels and a part of the disparity. Alone, it
+// contradicts the new one by LEAST pixels to MOST in so many of 5x5 blocks: what differs by more was rather uncovered.
+#define EGOSGM_DYNAMIC_HIDES_PX 1.0f
+#define EGOSGM_DYNAMIC_NEW_PX 1.5f
+#define EGOSGM_DYNAMIC_PART 0.05f
+#define EGOSGM_DYNAMIC_LEAST_PX 1.0f
+#define EGOSGM_DYNAMIC_MOST_PX 3.0f
+#define EGOSGM_DYNAMIC_DEPTH_VOTES 22
+// A pixel is like a block where their disparities differ by no more than this. It is marked where one of its 3x3 blocks
+// that are like it moves for every SHARE that do not.
+#define EGOSGM_DYNAMIC_ALIKE_PX 1.0f
+#define EGOSGM_DYNAMIC_ALIKE_PART 0.03f
+#define EGOSGM_DYNAMIC_SHARE 3
 
 // Reasons looks this many pixels to all sides for texture: it is flat where grey values two columns apart differ by
 // less than this in the mean, of the 255 levels that the image fills (host/grey_levels.h).

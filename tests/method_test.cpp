@@ -38,7 +38,10 @@ struct Built {
 TEST(Method, BuildsWhatItsOptionsNeed) {
   EXPECT_FALSE(Built().has("sad_check.cl"));
   EXPECT_TRUE(Built([](auto& o) { o.sad_check.max_difference = 9; }).has("sad_check.cl"));
-  EXPECT_TRUE(Built().has("dynamic_map.cl"));
+  Built asked;
+  EXPECT_FALSE(asked.has("dynamic_map.cl"));
+  asked.method.prepare(PixelType::kU8, {Output::kDynamic});
+  EXPECT_TRUE(asked.has("dynamic_map.cl"));
   for (const char* file : {"right_map.cl", "read_off.cl"}) {
     EXPECT_FALSE(Built().has(file)) << file;
     EXPECT_TRUE(Built([](auto& o) { o.track_right = false; }).has(file)) << file;
@@ -48,7 +51,8 @@ TEST(Method, BuildsWhatItsOptionsNeed) {
   for (const char* file : {"coarse_match.cl", "median_filter.cl", "vertical_alignment.cl"}) {
     EXPECT_FALSE(paper.has(file)) << file;
   }
-  const Built alone([](auto& o) { o.temporal = false; });
+  Built alone([](auto& o) { o.temporal = false; });
+  alone.method.prepare(PixelType::kU8, {Output::kDynamic});
   for (const char* file : {"dynamic_map.cl", "forward_warp.cl", "kalman_update.cl", "coarse_match.cl"}) {
     EXPECT_FALSE(alone.has(file)) << file;
   }
@@ -74,6 +78,8 @@ TEST(Method, BuildsNothingInAFrame) {
   FrameTransfer transfer(built.context, kSize, {0, 32});
   Belief before(built.context, kSize), after(built.context, kSize);
   const Wanted wanted{Output::kRightDisparity, Output::kRightVariance, Output::kDynamic};
+  built.method.prepare(PixelType::kU8, wanted);
+  built.context.build();
   const int builds = built.context.builds();
   for (int index = 0; index < video.size(); ++index) {
     const ImageMemory left = video.image(index, EGOSGM_LEFT), right = video.image(index, EGOSGM_RIGHT);

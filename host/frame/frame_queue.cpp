@@ -129,13 +129,13 @@ void FrameQueue::submit(const ImageView& left, const ImageView& right, const std
 DeviceMaps FrameQueue::enqueue(const FrameImages& images, const std::optional<Motion>& motion, cl_event* done,
                                bool wants_dynamic) {
   expect_device_frames_not_failed();
-  build(images.type, {});
+  Wanted wanted = kOnDevice;
+  if (wants_dynamic) wanted.add(Output::kDynamic);
+  build(images.type, wanted);
   FrameTransfer& transfer = free_transfer();
   Belief after = free_memory();
   ocl::Drain drain{context_};
   release_results();
-  Wanted wanted = kOnDevice;
-  if (wants_dynamic) wanted.add(Output::kDynamic);
   const Plan plan =
       plan_of(method_options_, belief_.why_not, belief_.offset.is_known, since_images(belief_, motion), wanted);
   after.images->clear();

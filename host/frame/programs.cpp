@@ -33,7 +33,8 @@ std::vector<ocl::ProgramSource> sources_of(ocl::Context& context, const Device& 
     MethodOptions all = all_stages(method_of(options, tuning));
     all.track_right = track_right;
     Method method(context, {1, 1}, any, all, tuning);
-    for (const PixelType type : {PixelType::kU8, PixelType::kU16}) method.prepare(type, {Output::kReason});
+    for (const PixelType type : {PixelType::kU8, PixelType::kU16})
+      method.prepare(type, {Output::kReason, Output::kDynamic});
   }
   return context.sources();
 }

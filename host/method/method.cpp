@@ -28,7 +28,7 @@ FrameResults Method::frame(const Plan& plan, const FrameImages& uploaded, const 
     publish_.write(plan,
                    {images, match_.matcher().codes(), prediction, measured, match_.speckle_runs(plan), after.maps,
                     result, w.fusion.doubtful, evidence_of(plan, after), w.fusion.evidence.evidence, plan.grey_step},
-                   given_out.variance, w.published);
+                   before, after, given_out.variance, w.published);
   });
   return {{result, given_out.variance}, measured, offset, images};
 }
@@ -97,7 +97,7 @@ Method::Method(ocl::Context& context, shared::ImageSize size, const Calibration&
       }),
       match_(context, size, options, tuning),
       search_(context, size, options, tuning),
-      publish_(context, size, options) {
+      publish_(context, size, calibration, options) {
   if (!options.temporal) return;
   predict_.emplace(context, size, calibration, options, tuning);
   fuse_.emplace(context, size, options);

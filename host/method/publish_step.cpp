@@ -16,29 +16,38 @@ std::vector<PublishedMap> Published::maps(const Wanted& wanted) const {
   return maps;
 }
 
-PublishStep::PublishStep(ocl::Context& context, shared::ImageSize size, const MethodOptions& options)
+PublishStep::PublishStep(ocl::Context& context, shared::ImageSize size, const Calibration& calibration,
+                         const MethodOptions& options)
     : context_(context),
       output_variance_(context, size, options.output_variance),
       reasons_([&context, size, options, repeats = Reasons::repeats(context, size)](PixelType type) {
         return Reasons(context, size, type, options, repeats);
       }) {
-  if (options.temporal) dynamic_map_.emplace(context, size);
+  if (!options.temporal) return;
+  build_dynamic_map_ = [&context, size, calibration, levels = DynamicMap::levels(context, size)] {
+    return DynamicMap(context, size, calibration, levels);
+  };
 }
 
 void PublishStep::prepare(PixelType type, const Wanted& wanted) {
   if (wanted.has(Output::kReason)) reasons_.prepare(type);
+  if (wanted.has(Output::kDynamic) && build_dynamic_map_ && !dynamic_map_) dynamic_map_.emplace(build_dynamic_map_());
 }
 
-void PublishStep::write(const Plan& plan, const Reasons::Inputs& inputs, Map& variance, Published& published) {
+void PublishStep::write(const Plan& plan, const Reasons::Inputs& inputs, const Belief& before, Belief& after,
+                        Map& variance, Published& published) {
   const Wanted& wanted = plan.wanted;
   if (wanted.has(Output::kVariance) || wanted.has(Output::kRightVariance)) {
     output_variance_.compute(inputs.given_out, inputs.belief, inputs.measured, variance,
                              wanted.has(Output::kRightVariance) ? Views::kBoth : Views::kLeft);
   }
   if (wanted.has(Output::kReason)) reasons_[inputs.images.type].explain(inputs, published.reason);
+  after.has_halved = wanted.has(Output::kDynamic) && dynamic_map_;
+  if (after.has_halved) dynamic_map_->keep(inputs.images, after.halved);
   if (!wanted.has(Output::kDynamic)) return;
-  if (inputs.prediction) {
-    dynamic_map_->mark(inputs.prediction->maps.disparity, inputs.measured.disparity, published.dynamic);
+  if (before.has_halved && plan.predicts()) {
+    dynamic_map_->mark({before.halved, before.maps.disparity}, {after.halved, inputs.given_out}, *plan.motion,
+                       published.dynamic);
   } else {
     context_.enter("DynamicMap");
     published.dynamic.fill(context_, 0);

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
+#include <optional>
 #include <vector>
 
+#include "host/method/belief.h"
 #include "host/method/plan.h"
 #include "host/method/predict_step.h"
 #include "host/stages/dynamic_map.h"
@@ -30,18 +33,22 @@ struct Published {
 /// Makes what is given out and no later frame rests on.
 class PublishStep {
  public:
-  PublishStep(ocl::Context& context, shared::ImageSize size, const MethodOptions& options);
+  PublishStep(ocl::Context& context, shared::ImageSize size, const Calibration& calibration,
+              const MethodOptions& options);
 
   /// Builds what is wanted of images of `type`.
   void prepare(PixelType type, const Wanted& wanted);
 
-  /// Writes what the plan wants. `variance`: [px^2] of what is given out.
-  void write(const Plan& plan, const Reasons::Inputs& inputs, Map& variance, Published& published);
+  /// Writes what the plan wants. `before`: the belief of the frame before. `after`: this frame's; it keeps the left
+  /// image for the next frame's `dynamic` where this frame's is wanted. `variance`: [px^2] of what is given out.
+  void write(const Plan& plan, const Reasons::Inputs& inputs, const Belief& before, Belief& after, Map& variance,
+             Published& published);
 
  private:
   ocl::Context& context_;
   OutputVariance output_variance_;
-  std::optional<DynamicMap> dynamic_map_;
+  std::function<DynamicMap()> build_dynamic_map_;  // null: frames have no prediction
+  std::optional<DynamicMap> dynamic_map_;          // once it was wanted
   OfEachType<Reasons> reasons_;
 };
 

@@ -14,13 +14,14 @@
 namespace egosgm {
 
 /// Maps that show how a frame's result came about, of the left view: what was predicted, measured and searched, and
-/// where the former two contradict each other.
+/// what moves by itself.
 struct DebugMaps {
   MapView<float> predicted, predicted_variance;  // before matching
   MapView<float> measured, measured_variance;    // after matching and its checks
   MapView<std::uint16_t> search_width;           // disparities that can win at each pixel
-  // 255 where prediction and measurement contradict each other, as on what moves by itself towards or away from the
-  // camera; else 0, also where one of them is missing, as in every frame without a prediction
+  // 255 where something moves by itself: the last image and the last map, moved by the camera's motion, contradict the
+  // new ones. Else 0, also where that cannot be asked: everywhere without a prediction, or where the frame before was
+  // not asked for this map.
   MapView<std::uint8_t> dynamic;
 };
 

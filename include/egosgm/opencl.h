@@ -47,10 +47,10 @@ class EGOSGM_EXPORT DevicePipeline {
 
   /// Enqueues a frame behind what is enqueued on the queue, and returns. The images must not change until it has ended.
   /// `done`, if not null, becomes an event of its end, whose queue was flushed, and which the caller releases.
-  /// `wants_dynamic`: makes DeviceMaps::dynamic, too. Throws InvalidArgument before anything is enqueued, or
-  /// DeviceError: then nothing of the frame is left on the queue, and the pipeline is as it was before. A frame that
-  /// fails on the device later (its event says so), also with others behind it, makes the next call throw DeviceError;
-  /// that one forgets all of them, as `Pipeline::reset` does.
+  /// `wants_dynamic`: makes DeviceMaps::dynamic, too, which marks nothing where the frame before did not want it.
+  /// Throws InvalidArgument before anything is enqueued, or DeviceError: then nothing of the frame is left on the
+  /// queue, and the pipeline is as it was before. A frame that fails on the device later (its event says so), also with
+  /// others behind it, makes the next call throw DeviceError; that one forgets all of them, as `Pipeline::reset` does.
   DeviceMaps enqueue(const DeviceImages& images, const std::optional<Motion>& motion, cl_event* done = nullptr,
                      bool wants_dynamic = false);
 

@@ -347,18 +347,22 @@ def test_a_reason_tells_why_a_pixel_has_no_value():
 
 
 def test_the_dynamic_map_finds_what_moves():
-    street = egosgm.SyntheticSequence(frames=4, moving_object=True)
+    street = egosgm.SyntheticSequence(frames=8, moving_object=True)
     pipeline = egosgm.Pipeline(street.calibration, 640, 240)
-    for k in range(4):
+    marked, moving = [], []
+    for k in range(8):
         frame = street.render(k)
         result = pipeline.process(frame.left, frame.right, street.motion(k) if k else None, outputs="dynamic")
         assert result.dynamic.dtype == np.uint8
+        assert set(np.unique(result.dynamic)) <= {0, 255}
         if k == 0:
             assert not result.dynamic.any(), "nothing was predicted"
-    marked, moving = result.dynamic == 255, frame.left_moving > 0
-    assert (marked == (result.dynamic > 0)).all()
-    assert marked[moving].mean() > 0.5
-    assert marked[~moving].mean() < 0.05
+        else:
+            marked.append(result.dynamic > 0)
+            moving.append(frame.left_moving > 0)
+    marked, moving = np.array(marked), np.array(moving)
+    assert marked[moving].mean() > 0.5, "but for a car that another one hides in between"
+    assert marked[~moving].mean() < 0.01
 
 
 def nameless_import_error(name, monkeypatch, folder):

@@ -5,12 +5,18 @@
 #include <vector>
 
 #include "kernels/shared.h"
-#include "tests/support/random_maps.h"
 
 namespace egosgm::reference {
 
-/// Of the left view.
-std::vector<std::uint8_t> dynamic_map(shared::ImageSize size, const testing::HostMaps& predicted,
-                                      const testing::HostMaps& measured);
+/// The left view of a frame, with grey values of 8 or 16 bits.
+struct LeftView {
+  std::vector<int> greys;
+  int bits;
+  std::vector<float> disparity;
+};
+
+/// `previous_from_current` moves the left view's disparity space back to the last frame.
+std::vector<std::uint8_t> dynamic_map(shared::ImageSize size, const LeftView& last, const LeftView& current,
+                                      const shared::DisparityMotion& previous_from_current);
 
 }  // namespace egosgm::reference

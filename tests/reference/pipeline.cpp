@@ -76,10 +76,6 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
   }
   if (has_prediction) update(images, frame);
 
-  frame.dynamic.assign(static_cast<std::size_t>(size_.width) * size_.height, 0);
-  if (has_prediction) {
-    frame.dynamic = dynamic_map(size_, frame.predicted, frame.passes.back().measured);
-  }
   frame.result = has_prediction ? frame.updated : frame.passes.back().measured;
   frame.evidence = has_prediction ? frame.fused.evidence
                                   : std::vector<std::uint8_t>(frame.result.disparity.size(),
@@ -90,6 +86,11 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
     belief.evidence = frame.evidence;
     frame.given_out = confirmed(size_, belief, !options_.track_right);
   }
+  frame.dynamic.assign(static_cast<std::size_t>(size_.width) * size_.height, 0);
+  if (has_prediction) {
+    frame.dynamic = dynamic_map(size_, {greys_, bits_, belief_->disparity},
+                                {images.greys, images.bits, frame.given_out}, motions->left_back);
+  }
   frame.output_variance =
       output_variance(size_, options_.output_variance, frame.given_out, frame.result, frame.passes.back().measured);
   frame.reasons = explain(images, frame);
@@ -99,6 +100,7 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
   belief_ = frame.result;
   belief_->evidence = frame.evidence;
   greys_ = images.greys;
+  bits_ = images.bits;
   return frame;
 }
 

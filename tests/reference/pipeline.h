@@ -24,6 +24,7 @@ struct Images {
 /// How the disparity spaces of both views move.
 struct ViewMotions {
   shared::DisparityMotion left, right;
+  shared::DisparityMotion left_back;  // moves the left view back to the frame before
 };
 
 /// A matching pass: of the resampled images, in their bands, and what each stage left of it.
@@ -75,6 +76,7 @@ class Pipeline {
   int code_padding_;
   std::optional<testing::HostMaps> belief_;
   std::vector<int> greys_;  // of the frame that it is of
+  int bits_ = 8;
   std::string no_belief_reason_ = "first frame";
   VerticalOffset offset_;
   bool has_offset_ = false;

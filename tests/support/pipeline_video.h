@@ -156,8 +156,10 @@ class Video {
   reference::ViewMotions twin_motions(int index) const { return twin_motions(motion(index)); }
   reference::ViewMotions twin_motions(Motion scaled) const {
     scaled.covariance *= static_cast<double>(setting_.options.forward_warp.motion_noise);
-    return {disparity_motion(calibration(), scaled, EGOSGM_LEFT),
-            disparity_motion(calibration(), scaled, EGOSGM_RIGHT)};
+    Motion back;
+    back.current_from_previous = scaled.current_from_previous.inverse();
+    return {disparity_motion(calibration(), scaled, EGOSGM_LEFT), disparity_motion(calibration(), scaled, EGOSGM_RIGHT),
+            disparity_motion(calibration(), back, EGOSGM_LEFT)};
   }
 
  private:

@@ -22,7 +22,7 @@ class StageChain {
         transfer_(context_, size, range_of(options)),
         before_(context_, size),
         after_(context_, size) {
-    method_.prepare(type, {Output::kReason});
+    method_.prepare(type, {Output::kReason, Output::kDynamic});
   }
 
   reference::Frame process(const ImageView& left, const ImageView& right, const std::optional<Motion>& motion) {
