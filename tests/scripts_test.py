@@ -91,6 +91,18 @@ class Scripts(unittest.TestCase):
         self.assertFalse((root / "build-device/stages.json").exists())
         self.assertTrue((root / "mine.json").exists())
 
+    def test_a_path_with_a_blank_and_a_comma_is_one_path_or_refused(self):
+        root = pathlib.Path(self.folder.name, "a b, c")
+        shutil.copytree(SCRIPTS, root / "scripts", ignore=shutil.ignore_patterns("__pycache__"))
+        pathlib.Path(self.folder.name, "apt-get").write_text("#!/bin/sh\necho \"$@\" >&2\ncat \"$APT_CONFIG\" >&2\nexit 1\n")
+        pathlib.Path(self.folder.name, "apt-get").chmod(0o755)
+        done = self.called(root / "scripts/install-dependencies", "--arm")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn(f'-qq update\nDir::State "{root}/build-arm/host.apt/state";\n', done.stderr)
+        done = self.called(root / "scripts/try-arm")
+        self.assertEqual((done.returncode, done.stdout), (2, ""))
+        self.assertIn(f"try-arm: {root}: an overlay of file systems takes no path with a blank", done.stderr)
+
     def test_the_lane_of_threads_names_tests_that_there_are(self):
         names = re.search(r"^threaded='\^\((.*)\)'$", (SCRIPTS / "lanes").read_text(), re.MULTILINE)[1]
         outer, programs = re.fullmatch(r"(.*)\|program\\\.\((.*)\)\$", names).groups()
