@@ -325,6 +325,8 @@ std::string_view foreign_format(std::string_view text) {
   if (text.starts_with("\x1f\x8b")) return "packed by gzip";
   if (text.starts_with("PK\x03\x04")) return "an archive of NumPy arrays (.npz)";
   if (text.starts_with("\x93NUMPY")) return "one NumPy array";
+  if (text.starts_with("\x89HDF")) return "HDF5, as MATLAB writes it";
+  if (text.starts_with("\x89PNG") || text.starts_with("\xff\xd8\xff")) return "a picture";
   for (const Format& format : kFormats) {
     if (has_all(text, format.words)) return format.name;
   }

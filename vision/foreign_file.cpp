@@ -5,6 +5,7 @@
 
 #include "egosgm/error.h"
 #include "vision/file_io.h"
+#include "vision/file_kinds.h"
 #include "vision/frame_names.h"
 
 namespace egosgm::vision {
@@ -17,6 +18,10 @@ constexpr const char* kLive =
     "it names a live camera: in Python, egosgm.run takes a generator of its pairs; or record both, and `egosgm "
     "rectify` "
     "reads the videos";
+
+constexpr const char* kWeb =
+    "it is an address of the web: download what it holds, and unpack it; in Python, egosgm.run takes a generator of a "
+    "live camera's pairs";
 
 std::string archive(const char* kind) {
   return std::string("it is ") + kind + ": unpack it, and give the folder that it holds";
@@ -38,9 +43,15 @@ std::string foreign_kind(std::string_view start) {
     std::string meaning;
   };
   const std::string rosbag = "it is a recording of ROS: `egosgm run` and `doctor` take it by --bag";
+  const std::string photo = "it is a HEIC or AVIF, as phones write: convert it to PNG or JPEG";
   const Kind kinds[] = {
       {0, "version https://git-lfs", "it is a pointer of Git LFS, in place of which `git lfs pull` puts the file"},
+      {4, "ftyphei", photo},
+      {4, "ftypmif1", photo},
+      {4, "ftypavif", photo},
       {4, "ftyp", std::string("it is a video") + kRectify},
+      {0, "GIF8", "it is a GIF: write its pictures as PNG"},
+      {0, "\x93NUMPY", "it is an array of NumPy: in Python, egosgm.run takes pairs of images; or write them as PNG"},
       {8, "AVI ", std::string("it is a video") + kRectify},
       {0, "\x1a\x45\xdf\xa3", std::string("it is a video") + kRectify},
       {0, "II*\0"sv, std::string("it is a TIFF") + kRectify},
@@ -72,7 +83,14 @@ std::string foreign_kind(std::string_view start) {
 std::string foreign_input(const fs::path& path) {
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
-  if (!fs::is_regular_file(status)) return names_a_camera(path) ? kLive : "";
+  if (!fs::is_regular_file(status)) {
+    const std::string text = path.string();
+    if (text.starts_with("http://") || text.starts_with("https://")) return kWeb;
+    if (names_a_camera(path)) return kLive;
+    const bool is_pattern = text.find('*') != std::string::npos || text.find("%0") != std::string::npos;
+    return is_pattern ? "it is a pattern: give --left PATTERN --right PATTERN --calib FILE, patterns in quotes" : "";
+  }
+  if (is_own_calibration(path)) return "it is a calibration: give the folder of the sequence that it belongs to";
   const std::string extension = lower(path.extension().string());
   if (extension == ".mpo") {
     return "it holds both pictures of a 3D camera (MPO), which `egosgm rectify --side-by-side` reads, with the "

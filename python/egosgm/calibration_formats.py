@@ -35,6 +35,8 @@ def kalibr(data: Dict[str, Any], file: pathlib.Path) -> StereoRig:
         right_from_left = second.matrix((4, 4), "T_cn_cnm1")
     elif "T_cam_imu" in second.data and "T_cam_imu" in first.data:
         right_from_left = second.matrix((4, 4), "T_cam_imu") @ np.linalg.inv(first.matrix((4, 4), "T_cam_imu"))
+    elif "T_imu_cam" in second.data and "T_imu_cam" in first.data:  # OpenVINS's
+        right_from_left = np.linalg.inv(second.matrix((4, 4), "T_imu_cam")) @ first.matrix((4, 4), "T_imu_cam")
     else:
         raise chain.refuse(" and lacks T_cn_cnm1, where the second camera stands")
     return chain.pair(cameras, right_from_left, first.resolution())
@@ -296,7 +298,7 @@ _NAMES = {
     "left_distortion": r"(d|dist|distortion|dist(ortion)?coef(f)?(s|icients)?)(l|left|1)|(l|left|1)(d|dist|distortion|dist(ortion)?coef(f)?(s|icients)?)",
     "right_distortion": r"(d|dist|distortion|dist(ortion)?coef(f)?(s|icients)?)(r|right|2)|(r|right|2)(d|dist|distortion|dist(ortion)?coef(f)?(s|icients)?)",
     "R": r"r|om|rot|rotmat|rotation(matrix)?|rmat|rstereo|stereor", "T": r"t|trans|transvec|translation(vector)?|tvec|tstereo|stereot",
-    "Q": r"q|disptodepthmat|disparitytodepth", "size": r"(image|img)?(size|shape|resolution)|dims", "width": r"(image|img|camera)?(width|sizex)", "height": r"(image|img|camera)?(height|sizey)",
+    "Q": r"q|disptodepthmat|disparitytodepth", "size": r"(image|img)?(size|shape|resolution)|dims", "width": r"(left|intrinsics?)?(image|img|camera)?(size|resolution)?(width|sizex)", "height": r"(left|intrinsics?)?(image|img|camera)?(size|resolution)?(height|sizey)",
     "R1": r"r1", "R2": r"r2", "P1": r"p1", "P2": r"p2",
     "fx": r"(intrinsics?)?(f|fx|focal(length)?(px)?)", "fy": r"(intrinsics?)?fy", "cx": r"(intrinsics?)?(cx[0l]?|u0|ppx)", "cy": r"(intrinsics?)?(cy[0l]?|v0|ppy)",
     "right_cx": r"cx[1r]", "baseline": r"b|(extrinsics?|stereo)?baseline(m|met(er|re)s?)?", "baseline_mm": r"baseline(mm|millimet(er|re)s?)",

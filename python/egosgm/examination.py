@@ -238,7 +238,8 @@ class Examination:
     def _sides(behind: float) -> Finding:
         text = f"{100 * behind:.1f} % of the points lie behind the cameras"
         if behind > 0.5:
-            return Finding("problem", "sides", text, "left and right are swapped: exchange the images (and their calibrations)")
+            return Finding("problem", "sides", text, "left and right are swapped, or both images are mirrored or upside down: "
+                           "exchange the images (and their calibrations), or turn them")
         if behind <= _BEHIND_SHARE:
             return Finding("ok", "sides", text)
         return Finding("problem", "sides", text, "the principal points differ by more than doffs_px says, or the cameras converge: rectify again, or give "

@@ -71,6 +71,7 @@ RECTIFIED = {
     "basalt.json": json.dumps(dict(value0=dict(T_imu_cam=[dict(px=x, py=0, pz=0, qx=0, qy=0, qz=0, qw=1) for x in (1.0, 1.0 + B)], resolution=[[WIDTH, HEIGHT]] * 2,
                                                intrinsics=[dict(camera_type="pinhole", intrinsics=dict(fx=F, fy=F, cx=CX, cy=CY))] * 2))),
     "kalibr_imu.yaml": kalibr(T_cam_imu=SHIFT).replace("cam1:", "cam1:", 1).replace("cam0:\n", f"cam0:\n  T_cam_imu: {np.eye(4).tolist()}\n"),
+    "openvins.yaml": kalibr(T_imu_cam=np.linalg.inv(SHIFT).tolist()).replace("cam0:\n", f"cam0:\n  T_imu_cam: {np.eye(4).tolist()}\n"),
     "kalibr_none.yaml": kalibr(model="none", lens=()),
 }
 RAW = {
@@ -128,9 +129,11 @@ def test_of_rectified_images_of_another_size(tmp_path):
     (tmp_path / "orb_slam.yaml").write_text(RECTIFIED["orb_slam3.yaml"] + f"Camera.width: {WIDTH}\nCamera.height: {HEIGHT}\n")
     (tmp_path / "flat.json").write_text(RECTIFIED["flat.json"])
     (tmp_path / "q.json").write_text(json.dumps(dict(Q=Q, image_size=[WIDTH, HEIGHT])))
+    (tmp_path / "nested.json").write_text(json.dumps(dict(Q=Q, image_size=dict(width=WIDTH, height=HEIGHT))))
+    (tmp_path / "inner.json").write_text(json.dumps(dict(intrinsics=dict(fx=F, cx=CX, cy=CY, width=WIDTH, height=HEIGHT), baseline=B)))
     (tmp_path / "kitti.txt").write_text(RECTIFIED["kitti.txt"].replace("P", "P_rect_0") + f"S_rect_00: {WIDTH} {HEIGHT}\n")
     (tmp_path / "middlebury.txt").write_text(f"cam0=[{F} 0 {CX}; 0 {F} {CY}; 0 0 1]\ncam1=[{F} 0 {CX}; 0 {F} {CY}; 0 0 1]\nbaseline={1000 * B}\nwidth={WIDTH}\nheight={HEIGHT}\n")
-    for name in ("kalibr.yaml", "left.yaml", "orb_slam.yaml", "flat.json", "q.json", "kitti.txt", "middlebury.txt"):
+    for name in ("kalibr.yaml", "left.yaml", "orb_slam.yaml", "flat.json", "q.json", "nested.json", "inner.json", "kitti.txt", "middlebury.txt"):
         expect_rectified(read(name, np.array([WIDTH, HEIGHT])))
         with pytest.raises(egosgm.InvalidArgument, match=f"{name}.*is of images of 640x480, and these have 320x240"):
             read(name, (WIDTH // 2, HEIGHT // 2))
@@ -309,7 +312,8 @@ def test_virtual_kitti(tmp_path):
 
 
 @pytest.mark.parametrize("content, named", [
-    (b"\x80\x04\x95", "a pickle of Python"), (b"MATLAB 5.0 MAT-file", "a file of MATLAB"), ("fx = 460\n".encode("utf-16"), "is UTF-16"),
+    (b"\x80\x04\x95", "a pickle of Python"), (b"MATLAB 5.0 MAT-file", "a file of MATLAB"), (b"\x89HDF\r\n", "a file of MATLAB"),
+    ("fx = 460\n".encode("utf-16"), "is UTF-16"),
 ])
 def test_files_that_are_no_text(content, named, tmp_path):
     (tmp_path / "calib").write_bytes(content)

@@ -154,6 +154,7 @@ TEST_F(CalibrationIo, OtherNamesOfTwoCameras) {
 TEST_F(CalibrationIo, TransposedMatricesAreNamed) {
   const std::string p = "700 0 0 0 710 0 600 180 1 -350 0 0";
   expect_text_refused("P0: " + p + "\nP1: " + p, {":1:", "P0 is transposed, as MATLAB writes it"});
+  expect_text_refused("\x89PNG\r\n Q: 1", {"is a picture, not one of EgoSGM's formats"});
   expect_text_refused("cam0=[700 0 0; 0 710 0; 600 180 1]\ncam1=[700 0 600; 0 710 180; 0 0 1]\nbaseline=1",
                       {":1:", "cam0 is transposed"});
 }

@@ -439,6 +439,10 @@ TEST_F(DatasetTest, WhatIsGivenInPlaceOfAFolderIsNamed) {
                                                        {"\x1f\x8b\x08rest", "packed by gzip: unpack it"},
                                                        {std::string(257, 'x') + "ustar", "a tar archive: unpack it"},
                                                        {std::string("\0\0\0\x18", 4) + "ftypmp42", "is a video"},
+                                                       {std::string("\0\0\0\x18", 4) + "ftypheic", "a HEIC"},
+                                                       {"GIF89a", "a GIF"},
+                                                       {"\x93NUMPY", "an array of NumPy"},
+                                                       {kOwnCalibration, "is a calibration: give the folder"},
                                                        {"\x89MCAP0", "by --bag"},
                                                        {"#ROSBAG V2.0", "by --bag"}};
   for (const auto& [content, named] : kinds) {
@@ -450,8 +454,10 @@ TEST_F(DatasetTest, WhatIsGivenInPlaceOfAFolderIsNamed) {
   add_text("HD720.svo2", "x");
   expect_refused([&] { open_folder(root_ / "HD720.svo2"); }, {"recording of a ZED", "ZED_SVO_Export"});
   for (const char* camera : {"0", "/dev/video77", "rtsp://camera/left"}) {
-    expect_refused([&] { open_folder(camera); }, {camera, "a live camera"});
+    expect_refused([&] { open_folder(camera); }, {camera, "it names a live camera"});
   }
+  expect_refused([&] { open_folder("https://x.org/drive.zip"); }, {"an address of the web: download"});
+  expect_refused([&] { open_folder(root_ / "left/*.png"); }, {"it is a pattern: give --left PATTERN"});
 }
 
 TEST_F(DatasetTest, SizesThatACalibrationSaysAreThoseOfTheImages) {
