@@ -109,10 +109,12 @@ void for_each_count(Counts& counts, Action act) {
   act("sky_valid", counts.sky_valid);
   act("valid", counts.valid);
   act("bad", counts.bad);
+  act("bad_1px", counts.bad_1px);
   act("d1", counts.d1);
   act("bad_interpolated", counts.bad_interpolated);
   act("d1_interpolated", counts.d1_interpolated);
   act("absolute_error_px", counts.absolute_error_px);
+  act("signed_error_px", counts.signed_error_px);
 }
 
 Json json_of(const DisparityCounts& counts) {
@@ -146,15 +148,16 @@ std::string cell(double value, int width, const char* unit) {
 }
 
 void print_row(const std::string& name, const DisparityMetrics& m) {
-  fmt::print("{:<14}{}{}{}{}{}{}{}{}{}\n", name, cell(m.wrong_of_all, 13, " %"), cell(m.bad_of_valid, 14, " %"),
+  fmt::print("{:<14}{}{}{}{}{}{}{}{}{}{}{}\n", name, cell(m.wrong_of_all, 13, " %"), cell(m.bad_of_valid, 14, " %"),
              cell(m.filled, 11, " %"), cell(m.density, 11, " %"), cell(m.bad_or_missing, 16, " %"),
              cell(m.interpolated, 14, " %"), cell(m.d1, 11, " %"), cell(m.d1_interpolated, 17, " %"),
-             cell(m.mae_px, 11, "px"));
+             cell(m.bad_1px, 11, " %"), cell(m.mae_px, 11, "px"), cell(m.mean_error_px, 14, "px"));
 }
 
 void print_errors(const Result& result) {
-  fmt::print("{:<14}{:>13}{:>14}{:>11}{:>11}{:>16}{:>14}{:>11}{:>17}{:>11}\n", "", "wrong_of_all", "bad_of_valid",
-             "filled", "density", "bad_or_missing", "interpolated", "d1", "d1_interpolated", "mae");
+  fmt::print("{:<14}{:>13}{:>14}{:>11}{:>11}{:>16}{:>14}{:>11}{:>17}{:>11}{:>11}{:>14}\n", "", "wrong_of_all", "bad_of_valid",
+             "filled", "density", "bad_or_missing", "interpolated", "d1", "d1_interpolated", "bad_1px", "mae",
+             "mean_error");
   for (std::size_t i = 0; i < result.rows.size(); ++i) print_row(result.rows[i].files.name, result.each[i]);
   if (result.each.size() > 1 || result.rows.empty()) {
     print_row("pooled", result.pooled());
@@ -187,7 +190,7 @@ bool read_count(const Json& json, Count& count) {
 /// Whether no part is larger than its whole.
 bool are_possible(const DisparityCounts& c) {
   return c.sky <= c.truth && c.sky_valid <= c.sky && c.sky_valid <= c.valid &&
-         c.valid - c.sky_valid <= c.truth - c.sky && c.bad <= c.valid && c.d1 <= c.bad &&
+         c.valid - c.sky_valid <= c.truth - c.sky && c.bad_1px <= c.valid && c.bad <= c.bad_1px && c.d1 <= c.bad &&
          c.bad_interpolated <= c.truth && c.d1_interpolated <= c.bad_interpolated;
 }
 
@@ -286,7 +289,9 @@ Command add_eval(CLI::App& program) {
       "  interpolated     bad after filling holes from the background (KITTI 2012's official figure)\n"
       "  d1               off by more than 3 px and 5 %, or without an estimate (KITTI 2015); d1_interpolated "
       "likewise\n"
+      "  bad_1px          off by more than 1 px, or without an estimate\n"
       "  mae              mean absolute error of the pixels with an estimate [px]\n"
+      "  mean_error       their mean signed error [px]: below 0, they look too far; --mask with what moves shows a lag\n"
       "pooled: over all pixels (KITTI 2015); mean: of the images' figures (KITTI 2012).\n"
       "A truth of 1/256 px (1 in KITTI's PNG) or less says that nothing is there, the sky for instance: a hole is "
       "right.\n"

@@ -53,7 +53,8 @@ void bind_disparity(py::module_& module) {
                                   "up.");
   pickle_members<&DisparityCounts::truth, &DisparityCounts::valid, &DisparityCounts::bad, &DisparityCounts::d1,
                  &DisparityCounts::bad_interpolated, &DisparityCounts::d1_interpolated,
-                 &DisparityCounts::absolute_error_px, &DisparityCounts::sky, &DisparityCounts::sky_valid>(counts);
+                 &DisparityCounts::absolute_error_px, &DisparityCounts::sky, &DisparityCounts::sky_valid,
+                 &DisparityCounts::bad_1px, &DisparityCounts::signed_error_px>(counts);
   counts.def(py::init<>())
       .def_readonly("truth", &DisparityCounts::truth)
       .def_readonly("valid", &DisparityCounts::valid)
@@ -62,6 +63,8 @@ void bind_disparity(py::module_& module) {
       .def_readonly("bad_interpolated", &DisparityCounts::bad_interpolated)
       .def_readonly("d1_interpolated", &DisparityCounts::d1_interpolated)
       .def_readonly("absolute_error_px", &DisparityCounts::absolute_error_px)
+      .def_readonly("bad_1px", &DisparityCounts::bad_1px)
+      .def_readonly("signed_error_px", &DisparityCounts::signed_error_px, "The sum of estimate - truth.")
       .def_readonly("sky", &DisparityCounts::sky, "Where the truth says that nothing is there.")
       .def_readonly("sky_valid", &DisparityCounts::sky_valid)
       .def("__add__", [](DisparityCounts a, const DisparityCounts& b) { return a += b; })
@@ -70,7 +73,8 @@ void bind_disparity(py::module_& module) {
                                               "Percent of the pixels with truth; bad: off by more than 3 px (KITTI).");
   pickle_members<&DisparityMetrics::bad_or_missing, &DisparityMetrics::bad_of_valid, &DisparityMetrics::density,
                  &DisparityMetrics::interpolated, &DisparityMetrics::d1, &DisparityMetrics::d1_interpolated,
-                 &DisparityMetrics::mae_px, &DisparityMetrics::filled, &DisparityMetrics::wrong_of_all>(metrics);
+                 &DisparityMetrics::mae_px, &DisparityMetrics::filled, &DisparityMetrics::wrong_of_all,
+                 &DisparityMetrics::bad_1px, &DisparityMetrics::mean_error_px>(metrics);
   metrics.def_readonly("bad_or_missing", &DisparityMetrics::bad_or_missing)
       .def_readonly("bad_of_valid", &DisparityMetrics::bad_of_valid, "Percent of the pixels with an estimate.")
       .def_readonly("density", &DisparityMetrics::density, "Percent of the pixels with a surface.")
@@ -78,6 +82,8 @@ void bind_disparity(py::module_& module) {
       .def_readonly("d1", &DisparityMetrics::d1)
       .def_readonly("d1_interpolated", &DisparityMetrics::d1_interpolated, "KITTI 2015's official figure.")
       .def_readonly("mae_px", &DisparityMetrics::mae_px)
+      .def_readonly("bad_1px", &DisparityMetrics::bad_1px, "Off by more than 1 px, or missing.")
+      .def_readonly("mean_error_px", &DisparityMetrics::mean_error_px, "Signed: below 0, pixels look too far.")
       .def_readonly("filled", &DisparityMetrics::filled)
       .def_readonly("wrong_of_all", &DisparityMetrics::wrong_of_all, "What is missing does not count.");
   module.def("compare_disparity", &compare, py::arg("estimate"), py::arg("truth"),

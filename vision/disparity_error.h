@@ -11,6 +11,7 @@
 namespace egosgm::vision {
 
 inline constexpr float kBad_px = 3.0f;
+inline constexpr float kOffBy1_px = 1.0f;
 inline constexpr float kBadRelative = 0.05f;
 
 inline bool is_bad(float estimate, float truth) { return std::abs(truth - estimate) > kBad_px; }
@@ -34,7 +35,10 @@ inline void count_pixel(float estimate, float filled, float truth, DisparityCoun
   ++counts.valid;
   counts.bad += is_bad(estimate, truth);
   counts.d1 += is_d1(estimate, truth);
-  counts.absolute_error_px += std::abs(static_cast<double>(truth) - estimate);
+  const double error_px = static_cast<double>(estimate) - truth;
+  counts.bad_1px += std::abs(error_px) > kOffBy1_px;
+  counts.absolute_error_px += std::abs(error_px);
+  counts.signed_error_px += error_px;
 }
 
 /// NaN where there is nothing to divide by.

@@ -64,10 +64,12 @@ DisparityCounts& DisparityCounts::operator+=(const DisparityCounts& other) {
   truth += other.truth;
   valid += other.valid;
   bad += other.bad;
+  bad_1px += other.bad_1px;
   d1 += other.d1;
   bad_interpolated += other.bad_interpolated;
   d1_interpolated += other.d1_interpolated;
   absolute_error_px += other.absolute_error_px;
+  signed_error_px += other.signed_error_px;
   sky += other.sky;
   sky_valid += other.sky_valid;
   return *this;
@@ -97,12 +99,14 @@ DisparityMetrics metrics_of(const DisparityCounts& counts) {
   const std::int64_t surfaces = counts.truth - counts.sky, seen = counts.valid - counts.sky_valid;
   const std::int64_t missing = surfaces - seen;
   return {.bad_or_missing = percent(counts.bad + missing, counts.truth),
+          .bad_1px = percent(counts.bad_1px + missing, counts.truth),
           .bad_of_valid = percent(counts.bad, counts.valid),
           .density = percent(seen, surfaces),
           .interpolated = percent(counts.bad_interpolated, counts.truth),
           .d1 = percent(counts.d1 + missing, counts.truth),
           .d1_interpolated = percent(counts.d1_interpolated, counts.truth),
           .mae_px = ratio(counts.absolute_error_px, static_cast<double>(counts.valid)),
+          .mean_error_px = ratio(counts.signed_error_px, static_cast<double>(counts.valid)),
           .filled = percent(counts.valid, counts.truth),
           .wrong_of_all = percent(counts.bad, counts.truth)};
 }
@@ -114,12 +118,14 @@ DisparityMetrics mean_of(const std::vector<DisparityMetrics>& images) {
     return result.value();
   };
   return {.bad_or_missing = mean(&DisparityMetrics::bad_or_missing),
+          .bad_1px = mean(&DisparityMetrics::bad_1px),
           .bad_of_valid = mean(&DisparityMetrics::bad_of_valid),
           .density = mean(&DisparityMetrics::density),
           .interpolated = mean(&DisparityMetrics::interpolated),
           .d1 = mean(&DisparityMetrics::d1),
           .d1_interpolated = mean(&DisparityMetrics::d1_interpolated),
           .mae_px = mean(&DisparityMetrics::mae_px),
+          .mean_error_px = mean(&DisparityMetrics::mean_error_px),
           .filled = mean(&DisparityMetrics::filled),
           .wrong_of_all = mean(&DisparityMetrics::wrong_of_all)};
 }

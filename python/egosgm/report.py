@@ -20,7 +20,8 @@ _PICTURES = 6
 _MOST_FRAMES = 2_000_000  # as many rows as a text of poses may have
 _LARGEST = 2**31 - 1
 _MOST_SIDE = 16384
-_FIGURES = ("bad_or_missing", "bad_of_valid", "density", "interpolated", "d1", "d1_interpolated", "mae_px", "filled", "wrong_of_all")
+_FIGURES = ("bad_or_missing", "bad_1px", "bad_of_valid", "density", "interpolated", "d1", "d1_interpolated", "mae_px", "mean_error_px", "filled",
+            "wrong_of_all")
 
 
 def _parser() -> Parser:
@@ -95,7 +96,7 @@ def _narrowed(picture: numpy.ndarray, width: int) -> numpy.ndarray:
 
 def _figures(counts: Any) -> Dict[str, Any]:
     values = {name: getattr(counts.metrics, name) for name in _FIGURES}
-    return {name.replace("mae_px", "mae"): None if value != value else value for name, value in values.items()}
+    return {{"mae_px": "mae", "mean_error_px": "mean_error"}.get(name, name): None if value != value else value for name, value in values.items()}
 
 
 def _doubts(text: str) -> List[Dict[str, str]]:

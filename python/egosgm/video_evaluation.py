@@ -71,6 +71,8 @@ class RegionFigures:
     density: float
     interpolated: float
     mae: float
+    bad_1px: float
+    mean_error: float
     filled: float
     wrong_of_all: float
     tepe_dynamicstereo_px: float
@@ -517,8 +519,8 @@ def _region_of(counts: Counts) -> RegionFigures:
     errors = counts["errors"]
     metrics = errors.metrics
     return RegionFigures(
-        truth_pixels=errors.truth, mae=metrics.mae_px,
-        **{name: getattr(metrics, name) for name in ("bad_or_missing", "bad_of_valid", "density", "interpolated", "filled", "wrong_of_all")},
+        truth_pixels=errors.truth, mae=metrics.mae_px, mean_error=metrics.mean_error_px,
+        **{name: getattr(metrics, name) for name in ("bad_or_missing", "bad_of_valid", "bad_1px", "density", "interpolated", "filled", "wrong_of_all")},
         **_change_figures(counts, "tepe", "tepe_dynamicstereo"),
         tepe_dynamicstereo_filled_px=ratio(counts["filled.sum_px"], counts["filled.pixels"]), **_beside_figures(counts))
 

@@ -284,7 +284,7 @@ def _text_of(found: VideoInput, total: VideoCounts) -> str:
     lines = [f"{counted(len(found.frames), 'frame')}, {counted(found.successors, 'pair')} of frames{source}"]
     lines += [f"  {name:<46}{value:>12.4f}" for name, value in known.items()]
     columns = {"wrong_of_all": (13, " %"), "bad_of_valid": (14, " %"), "filled": (11, " %"), "density": (11, " %"), "bad_or_missing": (16, " %"),
-               "interpolated": (14, " %"), "mae": (12, "px"), "tepe_dynamicstereo_px": (12, "px")}
+               "interpolated": (14, " %"), "bad_1px": (11, " %"), "mae": (12, "px"), "mean_error": (12, "px"), "tepe_dynamicstereo_px": (12, "px")}
     regions = regions_of(total)
     if regions:
         names = [name if name != "tepe_dynamicstereo_px" else "tepe" for name in columns]

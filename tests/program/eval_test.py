@@ -60,7 +60,7 @@ class Eval(ProgramTest):
         result = json.loads(self.assert_works("eval", "--estimate", truth, "--truth", truth, "--json"))
         self.assertEqual(len(result["pairs"]), FRAMES)
         for key, value in {"bad_or_missing": 0, "bad_of_valid": 0, "density": 100, "interpolated": 0, "d1": 0,
-                           "d1_interpolated": 0, "mae": 0}.items():
+                           "d1_interpolated": 0, "bad_1px": 0, "mae": 0, "mean_error": 0}.items():
             self.assertEqual(result["pooled"][key], value, key)
         table = self.assert_works("eval", "--estimate", truth, "--truth", truth)
         self.assertIn("pooled", table)

@@ -32,6 +32,8 @@ TEST(Evaluation, CountsByTheRules) {
   EXPECT_EQ(counts.bad_interpolated, 3);
   EXPECT_EQ(counts.d1_interpolated, 2);
   EXPECT_DOUBLE_EQ(counts.absolute_error_px, 12.5);
+  EXPECT_DOUBLE_EQ(counts.signed_error_px, 6.5);
+  EXPECT_EQ(counts.bad_1px, 3);
   const DisparityMetrics metrics = metrics_of(counts);
   EXPECT_DOUBLE_EQ(metrics.bad_or_missing, 75);
   EXPECT_DOUBLE_EQ(metrics.bad_of_valid, 200.0 / 3);
@@ -40,6 +42,8 @@ TEST(Evaluation, CountsByTheRules) {
   EXPECT_DOUBLE_EQ(metrics.d1, 50);
   EXPECT_DOUBLE_EQ(metrics.d1_interpolated, 50);
   EXPECT_DOUBLE_EQ(metrics.mae_px, 12.5 / 3);
+  EXPECT_DOUBLE_EQ(metrics.mean_error_px, 6.5 / 3);
+  EXPECT_DOUBLE_EQ(metrics.bad_1px, 100) << "three of four, and a hole";
 }
 
 TEST(Evaluation, AHoleInTheSkyIsRightAndASurfaceThereIsWrong) {

@@ -17,10 +17,12 @@ struct EGOSGM_EXPORT DisparityCounts {
   std::int64_t truth = 0;             // pixels with truth
   std::int64_t valid = 0;             // of these, with an estimate
   std::int64_t bad = 0;               // of these, bad
+  std::int64_t bad_1px = 0;           // of the valid ones: |error| > 1 px
   std::int64_t d1 = 0;                // of the valid ones
   std::int64_t bad_interpolated = 0;  // of all with truth
   std::int64_t d1_interpolated = 0;   // of all with truth
   double absolute_error_px = 0;       // sum over the valid ones
+  double signed_error_px = 0;         // sum of estimate - truth over the valid ones
   std::int64_t sky = 0;               // of all with truth: nothing is there
   std::int64_t sky_valid = 0;         // of these, with an estimate
 
@@ -30,12 +32,14 @@ struct EGOSGM_EXPORT DisparityCounts {
 /// The figures, in percent of the pixels with truth unless said otherwise. NaN where there is nothing to divide by.
 struct DisparityMetrics {
   double bad_or_missing = 0;   // bad, or a surface without an estimate
+  double bad_1px = 0;          // off by more than 1 px, or a surface without an estimate
   double bad_of_valid = 0;     // percent of the pixels with an estimate
   double density = 0;          // percent of the pixels with a surface: those with an estimate
   double interpolated = 0;     // bad after background interpolation: KITTI 2012's official figure
   double d1 = 0;               // KITTI 2015's rule, or a surface without an estimate
   double d1_interpolated = 0;  // KITTI 2015's official figure
   double mae_px = 0;           // mean absolute error of the pixels with an estimate [px]
+  double mean_error_px = 0;    // mean signed error of the pixels with an estimate [px]: below 0, they look too far
   double filled = 0;           // with an estimate, whether a surface is there or not
   double wrong_of_all = 0;     // bad: what is missing does not count
 };
