@@ -155,9 +155,9 @@ void print_row(const std::string& name, const DisparityMetrics& m) {
 }
 
 void print_errors(const Result& result) {
-  fmt::print("{:<14}{:>13}{:>14}{:>11}{:>11}{:>16}{:>14}{:>11}{:>17}{:>11}{:>11}{:>14}\n", "", "wrong_of_all", "bad_of_valid",
-             "filled", "density", "bad_or_missing", "interpolated", "d1", "d1_interpolated", "bad_1px", "mae",
-             "mean_error");
+  fmt::print("{:<14}{:>13}{:>14}{:>11}{:>11}{:>16}{:>14}{:>11}{:>17}{:>11}{:>11}{:>14}\n", "", "wrong_of_all",
+             "bad_of_valid", "filled", "density", "bad_or_missing", "interpolated", "d1", "d1_interpolated", "bad_1px",
+             "mae", "mean_error");
   for (std::size_t i = 0; i < result.rows.size(); ++i) print_row(result.rows[i].files.name, result.each[i]);
   if (result.each.size() > 1 || result.rows.empty()) {
     print_row("pooled", result.pooled());
@@ -291,7 +291,8 @@ Command add_eval(CLI::App& program) {
       "likewise\n"
       "  bad_1px          off by more than 1 px, or without an estimate\n"
       "  mae              mean absolute error of the pixels with an estimate [px]\n"
-      "  mean_error       their mean signed error [px]: below 0, they look too far; --mask with what moves shows a lag\n"
+      "  mean_error       their mean signed error [px]: below 0, they look too far; --mask with what moves shows a "
+      "lag\n"
       "pooled: over all pixels (KITTI 2015); mean: of the images' figures (KITTI 2012).\n"
       "A truth of 1/256 px (1 in KITTI's PNG) or less says that nothing is there, the sky for instance: a hole is "
       "right.\n"

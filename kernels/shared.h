@@ -138,6 +138,16 @@ typedef struct {
   i32 first_view;      // of those that are matched, which lie one behind the other in what only a match needs
 } SgmParameters;
 
+// Parameters of KalmanUpdate. Without a gate (gate_px infinite), all that is predicted and measured is averaged, and
+// nothing is hidden or doubtful.
+typedef struct {
+  i32 width, height;
+  f32 gate_px, min_variance_px2;
+  i32 keep_predicted;
+  i32 has_evidence;  // else what the frame knows of evidence is not read, and all that lives is confirmed
+  i32 repeats;       // the images are those of the frame before, which make nobody surer
+} KalmanParameters;
+
 // The motion of a view's disparity space (eqs. 1-4): rows 1, 2 and 4 of H = Gamma T Gamma^-1; row 3 is (0, 0, 1, 0).
 // noise_*: variance of d' by the motion's covariance, over d'^2, as a form in (d', x' - cx, y' - cy).
 typedef struct {
@@ -149,7 +159,7 @@ typedef struct {
 #ifdef __cplusplus
 static_assert(sizeof(ImageSize) == 8 && sizeof(DisparityRange) == 8 && sizeof(Band) == 8 && sizeof(RowSum) == 8 &&
                   sizeof(BlockRange) == 12 && sizeof(EvidenceSum) == 8 && sizeof(SgmParameters) == 52 &&
-                  sizeof(DisparityMotion) == 84,
+                  sizeof(KalmanParameters) == 28 && sizeof(DisparityMotion) == 84,
               "kernels/*.cl read these layouts");
 }  // namespace egosgm::shared
 #endif

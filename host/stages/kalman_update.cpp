@@ -11,11 +11,14 @@ namespace egosgm {
 KalmanUpdate::KalmanUpdate(ocl::Context& context, shared::ImageSize size, const KalmanUpdateOptions& options,
                            int pixels)
     : stage_(context, "KalmanUpdate", "kalman_update.cl", size, pixels),
-      has_gate_(options.gate_px > 0),
-      gate_px_(options.gate_px > 0 ? options.gate_px : std::numeric_limits<float>::infinity()),
-      keep_predicted_(options.keep_predicted),
+      parameters_{.width = size.width,
+                  .height = size.height,
+                  .gate_px = options.gate_px > 0 ? options.gate_px : std::numeric_limits<float>::infinity(),
+                  .min_variance_px2 = options.min_variance_px2,
+                  .keep_predicted = options.keep_predicted,
+                  .has_evidence = false,
+                  .repeats = false},
       ask_neighbours_(options.ask_neighbours),
-      min_variance_px2_(options.min_variance_px2),
       blocks_(CoarseMatch::coarse_size(size)),
       sums_(context, 2 * static_cast<std::size_t>(EGOSGM_EVIDENCE_STRIDE(size.width)) * blocks_.height),
       counts_(context, sums_.size()),
@@ -33,14 +36,17 @@ void KalmanUpdate::update(const FlagMap& hidden, const StereoMaps& predicted, co
   const BlockEvidence& blocks = evidence ? evidence->blocks : none_;
   if (ask_neighbours_) {
     const ocl::Range each = ocl::every_pixels(stage_.enter(), blocks_, stage_.pixels(), count(views));
-    stage_.launch(sum_, each, stage_.size(), gate_px_, predicted.disparity, measured.disparity, sums_, counts_);
+    stage_.launch(sum_, each, stage_.size(), parameters_.gate_px, predicted.disparity, measured.disparity, sums_,
+                  counts_);
     stage_.launch(find_drift_, each, stage_.size(), sums_, counts_, drifts_);
   }
-  stage_.launch_pixels(update_, count(views), has_gate_, gate_px_, keep_predicted_, min_variance_px2_, hidden,
-                       predicted.disparity, predicted.variance, measured.disparity, measured.variance,
-                       evidence != nullptr, evidence && evidence->repeats, evidence ? evidence->before : hidden,
-                       blocks.evidence, blocks.found, drifts_, updated.disparity, updated.variance, doubtful,
-                       updated_evidence);
+  shared::KalmanParameters parameters = parameters_;
+  parameters.has_evidence = evidence != nullptr;
+  parameters.repeats = evidence && evidence->repeats;
+  stage_.launch(update_, ocl::every_pixels(stage_.enter(), stage_.size(), stage_.pixels(), count(views)), parameters,
+                hidden, predicted.disparity, predicted.variance, measured.disparity, measured.variance,
+                evidence ? evidence->before : hidden, blocks.evidence, blocks.found, drifts_, updated.disparity,
+                updated.variance, doubtful, updated_evidence);
 }
 
 }  // namespace egosgm

@@ -33,20 +33,16 @@ class KalmanUpdate {
 
  private:
   ocl::Stage stage_;
-  const cl_int has_gate_;
-  const float gate_px_;
-  const cl_int keep_predicted_;
+  const shared::KalmanParameters parameters_;
   const bool ask_neighbours_;
-  const float min_variance_px2_;
   const shared::ImageSize blocks_;
   ocl::Buffer<cl_int> sums_, counts_;
   Map drifts_;
   ocl::Kernel<const shared::ImageSize, const float, const Map, const Map, ocl::Buffer<cl_int>, ocl::Buffer<cl_int>>
       sum_;
   ocl::Kernel<const shared::ImageSize, const ocl::Buffer<cl_int>, const ocl::Buffer<cl_int>, Map> find_drift_;
-  ocl::Kernel<const shared::ImageSize, const cl_int, const float, const cl_int, const float, const FlagMap, const Map,
-              const Map, const Map, const Map, const cl_int, const cl_int, const FlagMap, const ocl::Buffer<cl_int>,
-              const Map, const Map, Map, Map, FlagMap, FlagMap>
+  ocl::Kernel<const shared::KalmanParameters, const FlagMap, const Map, const Map, const Map, const Map, const FlagMap,
+              const ocl::Buffer<cl_int>, const Map, const Map, Map, Map, FlagMap, FlagMap>
       update_;
   const BlockEvidence none_;
 };

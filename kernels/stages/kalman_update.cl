@@ -126,17 +126,17 @@ typedef struct {
   Ints sums, lives, counts;
 } Verdict;
 
-// `now`: of this frame. repeats: whether its images are those of the frame before, which make nobody surer. A
-// prediction is not asked where its match lies outside of the other image.
-static inline Verdict judged(const int repeats, const Ints before, const Ints now, const Floats found, const Floats d,
-                             const Floats z, const float gate, const int x, const int width, const int view) {
+// `now`: of this frame. A prediction is not asked where its match lies outside of the other image.
+static inline Verdict judged(const KalmanParameters* q, const Ints before, const Ints now, const Floats found,
+                             const Floats d, const Floats z, const int x, const int view) {
+  const float gate = q->gate_px;
   const Ints has_prediction = d > INVALID;
   const Ints has_measurement = z > INVALID;
   const Ints stays = has_prediction & !(has_measurement & (fabs(z - d) > gate));
   const Ints is_found = (found > INVALID) & (fabs(found - z) <= EGOSGM_EVIDENCE_COARSE_PX);
   const Floats away = nearest(d);
   const Floats match = FLOATS_OF_INTS(x + LANE_INDICES) + (view == EGOSGM_LEFT ? -away : away);
-  const Ints is_unseen = stays & ((match < (Floats)(0.0f)) | (match >= (Floats)(width)));
+  const Ints is_unseen = stays & ((match < (Floats)(0.0f)) | (match >= (Floats)(q->width)));
   const Ints kept = before * EGOSGM_EVIDENCE_KEPT >> 6;
   const Ints chosen = (Ints)(EGOSGM_EVIDENCE_OF_CHOICE);
   Ints sums = (stays ? kept : is_found ? (Ints)(0) : -chosen) + now - EGOSGM_EVIDENCE_OF_NOISE;
@@ -145,7 +145,7 @@ static inline Verdict judged(const int repeats, const Ints before, const Ints no
   // A measurement without evidence contradicts nothing: the prediction stays, and was not asked.
   const Ints falls_back = has_prediction & !stays & (sums < 0);
   sums = falls_back ? kept - EGOSGM_EVIDENCE_OF_NOISE : sums;
-  const Ints is_old = has_prediction & (Ints)(repeats ? -1 : 0);
+  const Ints is_old = has_prediction & (Ints)(q->repeats ? -1 : 0);
   sums = is_old ? before : sums;
   Verdict verdict;
   verdict.lives = (has_prediction | has_measurement) & (sums >= 0);
@@ -168,29 +168,26 @@ static inline void drop_lone(const ImageSize size, const int start, const int y,
   }
 }
 
-// `hidden`: not 0 where a surface nearer than the range hides what is behind it. has_gate: else all that is
-// predicted and measured is averaged, and nothing is hidden or doubtful. has_evidence: else `evidence_before`,
-// `block_evidence` and `found` are not read, and all that lives is confirmed.
-COMPILED_ONCE void update_row(const WorkItem at, const ImageSize size, const int has_gate, const float gate,
-                              const int keep_predicted, const float min_variance, global const uchar* hidden,
+// `hidden`: not 0 where a surface nearer than the range hides what is behind it.
+COMPILED_ONCE void update_row(const WorkItem at, const KalmanParameters q, global const uchar* hidden,
                               global const float* predicted, global const float* predicted_variance,
                               global const float* measured, global const float* measured_variance,
-                              const int has_evidence, const int repeats, global const uchar* evidence_before,
-                              global const int* block_evidence, global const float* found, global const float* drifts,
-                              global float* updated, global float* updated_variance, global uchar* updated_doubtful,
-                              global uchar* evidence) {
-  const int width = size.width;
+                              global const uchar* evidence_before, global const int* block_evidence,
+                              global const float* found, global const float* drifts, global float* updated,
+                              global float* updated_variance, global uchar* updated_doubtful, global uchar* evidence) {
+  const ImageSize size = {q.width, q.height};
+  const int width = q.width;
   const int y = at.y;
   const size_t view = (size_t)at.view * size.height * width;
   const size_t row = view + (size_t)y * width;
-  const Ints is_plain = (Ints)(has_gate ? 0 : -1);
+  const Ints is_plain = (Ints)(q.gate_px < INFINITY ? 0 : -1);
   const int blocks_high = (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
   const size_t row_of_blocks = ((size_t)at.view * blocks_high + y / EGOSGM_COARSE) * EGOSGM_EVIDENCE_STRIDE(size.width);
 
   FOR_CHUNKS(start, width) {
     Floats taken[CHUNK];
     FOR_BLOCKS(x, i, start, width) taken[i] = load_pixels(measured + row, x, width);
-    if (has_evidence) drop_lone(size, start, y, gate, predicted + row, measured + view, taken);
+    if (q.has_evidence) drop_lone(size, start, y, q.gate_px, predicted + row, measured + view, taken);
     FOR_BLOCKS(x, i, start, width) {
       const Floats d = load_pixels(predicted + row, x, width);
       const Floats z = taken[i];
@@ -198,17 +195,17 @@ COMPILED_ONCE void update_row(const WorkItem at, const ImageSize size, const int
       const Floats p = load_pixels(predicted_variance + row, x, width) + drift * drift;
       const Floats r = load_pixels(measured_variance + row, x, width);
       Verdict verdict = {(Ints)(EGOSGM_EVIDENCE_MOST), (Ints)(-1), (Ints)(-1)};
-      if (has_evidence) {
-        verdict = judged(repeats, moved_evidence(size, x, y, evidence_before + row),
+      if (q.has_evidence) {
+        verdict = judged(&q, moved_evidence(size, x, y, evidence_before + row),
                          OF_ITS_BLOCK(Ints, block_evidence + row_of_blocks, x),
-                         OF_ITS_BLOCK(Floats, found + row_of_blocks, x), d, z, gate, x, width, at.view);
+                         OF_ITS_BLOCK(Floats, found + row_of_blocks, x), d, z, x, at.view);
       }
       const Ints has_prediction = d > INVALID;
       const Ints has_measurement =
           (z > INVALID) & (is_plain | (load_bytes(hidden + row, x, width) == 0)) & (verdict.counts != 0);
       const Ints has_both = has_prediction & has_measurement;
-      const Ints fuses = has_both & (fabs(z - d) <= gate);
-      const Ints predicts = has_prediction & ((Ints)(keep_predicted) != 0);
+      const Ints fuses = has_both & (fabs(z - d) <= q.gate_px);
+      const Ints predicts = has_prediction & ((Ints)(q.keep_predicted) != 0);
 
       const Floats zero = 0.0f;
       const Floats sum = p + r;
@@ -225,7 +222,7 @@ COMPILED_ONCE void update_row(const WorkItem at, const ImageSize size, const int
       value = verdict.lives ? value : INVALID;
       const Floats variance = fuses ? fused_variance : has_both ? contradicting : has_measurement ? r : p;
 
-      const Floats least = min_variance;
+      const Floats least = q.min_variance_px2;
       store_pixels(value, updated + row, x, width);
       store_pixels(variance < least ? least : variance, updated_variance + row, x, width);
       const Ints contradicted = has_both & !fuses;
@@ -235,14 +232,12 @@ COMPILED_ONCE void update_row(const WorkItem at, const ImageSize size, const int
   }
 }
 
-KERNEL void update(const ImageSize size, const int has_gate, const float gate, const int keep_predicted,
-                   const float min_variance, global const uchar* hidden, global const float* predicted,
+KERNEL void update(const KalmanParameters q, global const uchar* hidden, global const float* predicted,
                    global const float* predicted_variance, global const float* measured,
-                   global const float* measured_variance, const int has_evidence, const int repeats,
-                   global const uchar* evidence_before, global const int* block_evidence, global const float* found,
-                   global const float* drifts, global float* updated, global float* updated_variance,
-                   global uchar* updated_doubtful, global uchar* evidence) {
-  update_row(THIS_WORK_ITEM, size, has_gate, gate, keep_predicted, min_variance, hidden, predicted, predicted_variance,
-             measured, measured_variance, has_evidence, repeats, evidence_before, block_evidence, found, drifts,
-             updated, updated_variance, updated_doubtful, evidence);
+                   global const float* measured_variance, global const uchar* evidence_before,
+                   global const int* block_evidence, global const float* found, global const float* drifts,
+                   global float* updated, global float* updated_variance, global uchar* updated_doubtful,
+                   global uchar* evidence) {
+  update_row(THIS_WORK_ITEM, q, hidden, predicted, predicted_variance, measured, measured_variance, evidence_before,
+             block_evidence, found, drifts, updated, updated_variance, updated_doubtful, evidence);
 }
