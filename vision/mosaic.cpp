@@ -15,7 +15,8 @@ constexpr double kLeastBrightness = 4;  // of a block, so that noise in the dark
 // mosaics 0.1 and more, also where one colour is only a tenth brighter than the others.
 constexpr double kLeastDifference = 0.04;
 
-/// By how much the columns of a block differ, in its even or in its odd rows, as a share of its brightness.
+/// By how much the columns of a block differ, in its even or in its odd rows, as a share of its brightness. Its rows
+/// must differ as much: else it has stripes, as sensors make them.
 double difference_in(const Image& grey, int top, int left) {
   double sums[2][2] = {};  // of even and odd rows and columns
   for (int y = 0; y < kBlock; ++y) {
@@ -23,8 +24,9 @@ double difference_in(const Image& grey, int top, int left) {
   }
   constexpr double kPixels = kBlock * kBlock / 4.0;
   const double brightness = (sums[0][0] + sums[0][1] + sums[1][0] + sums[1][1]) / (4 * kPixels);
-  const double difference = std::max(std::abs(sums[0][0] - sums[0][1]), std::abs(sums[1][0] - sums[1][1])) / kPixels;
-  return difference / std::max(kLeastBrightness, brightness);
+  const double columns = std::max(std::abs(sums[0][0] - sums[0][1]), std::abs(sums[1][0] - sums[1][1]));
+  const double rows = std::max(std::abs(sums[0][0] - sums[1][0]), std::abs(sums[0][1] - sums[1][1]));
+  return std::min(columns, rows) / kPixels / std::max(kLeastBrightness, brightness);
 }
 
 }  // namespace

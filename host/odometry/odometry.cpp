@@ -42,8 +42,11 @@ void check_images(const ImageView& left, const ImageView& right) {
   require(left.data && right.data && left.width > 0 && left.height > 0, "image is empty; give both images of a frame");
   if (left.width != right.width || left.height != right.height || left.type != right.type) {
     std::ostringstream text;
-    text << "stereo odometry: left image is " << left.width << "x" << left.height << ", right image is " << right.width
-         << "x" << right.height << "; give a rectified pair of one size and type";
+    const auto bits = [](const ImageView& image) {
+      return image.type == PixelType::kU8 ? " of 8 bits" : " of 16 bits";
+    };
+    text << "stereo odometry: left image is " << left.width << "x" << left.height << bits(left) << ", right image is "
+         << right.width << "x" << right.height << bits(right) << "; give a rectified pair of one size and type";
     throw InvalidArgument(text.str());
   }
   check_rows("stereo odometry: left image: ", left);

@@ -80,6 +80,8 @@ class Drive:
             source = _egosgm.open_folder(source, frames)
         elif frames:
             raise _egosgm.InvalidArgument(f"frames={frames!r}: only a folder's are chosen here")
+        if not hasattr(source, "__iter__") and not isinstance(source, (_egosgm.StereoSequence, Bag)):
+            raise _egosgm.InvalidArgument(f"source: is a {type(source).__name__}: give a folder, a sequence, a bag, or pairs of images")
         if not isinstance(motion, (int, np.bool_)):
             raise _egosgm.InvalidArgument(f"motion: is a {type(motion).__name__}: choose True or False; Pipeline.process takes motions that are known")
         self.sequence = source if isinstance(source, _egosgm.StereoSequence) else None
@@ -99,10 +101,12 @@ class Drive:
         if calibration is not None and not isinstance(calibration, _egosgm.Calibration):
             raise _egosgm.InvalidArgument(f"calibration: is a {type(calibration).__name__}: give an egosgm.Calibration; read_calibration reads a file")
         self.calibration = calibration
-        if lag not in (0, 1):
+        if not isinstance(lag, (int, np.integer)) or lag not in (0, 1):
             raise _egosgm.InvalidArgument(f"lag={lag!r}: choose 1, the device works while the next pair comes, or 0, a frame comes before the next pair is asked for")
         self._source, self._outputs, self._lag, self._options = source, outputs, int(lag), options
         self._bar = _bar(progress)
+        if odometry is not None and not isinstance(odometry, dict):
+            raise _egosgm.InvalidArgument(f"odometry: is a {type(odometry).__name__}: give a dict of StereoOdometry's options")
         self._odometry_options = (odometry or {}) if motion and calibration is not None else None
         if odometry and self._odometry_options is None:
             raise _egosgm.InvalidArgument("odometry: has options, but without a calibration, or with motion=False, there is none: leave them out")

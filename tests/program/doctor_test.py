@@ -156,6 +156,10 @@ class Doctor(InputTest):
                 self.assertIn("mosaics of colour sensors", found["text"])
                 self.assertNotIn("deinterlace", found["remedy"])
         self.assertIn("mosaics of colour sensors", self.assert_works("run", street, "--out", self.new_folder() / "out"))
+        for side in ("image_0", "image_1"):  # every other column of a sensor is brighter
+            for file in (self.street / side).iterdir():
+                write_grey(street / side / file.name, numpy.clip(read_grey(file) * numpy.tile((1, 1.1), WIDTH // 2), 0, 255))
+        self.assertNotIn("mosaics", self.assert_works("run", street, "--out", self.new_folder() / "out"))
         self.assertNotIn("mosaics", self.assert_works("run", self.street, "--out", self.new_folder() / "out"))
 
     def test_the_same_image_on_both_sides(self):

@@ -187,6 +187,9 @@ def test_what_is_wrong_is_said_before_a_frame_is_read(street_folder):
 def test_what_is_no_pair_and_no_calibration_is_said(street, frames):
     with pytest.raises(egosgm.InvalidArgument, match="calibration: is a tuple: give an egosgm.Calibration"):
         egosgm.run([], (700, 700, 320, 240, 0.1))
+    for wrong, named in ((dict(source=None), "source: is a NoneType"), (dict(odometry=[1]), "odometry: is a list"), (dict(lag=np.arange(2)), "choose 1")):
+        with pytest.raises(egosgm.InvalidArgument, match=named):
+            egosgm.run(**{"source": [], **wrong})
     for source, named in (([frames[0].left], "pair 0: is a ndarray"), ([(frames[0].left, frames[0].right), (frames[0].left,)], "pair 1: is a tuple"),
                           ([(frames[0].left, None)], "right is no array")):
         with pytest.raises(egosgm.InvalidArgument, match=named):
