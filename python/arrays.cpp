@@ -171,6 +171,8 @@ py::array array_of(const vision::Image& mat) {
   const auto item = static_cast<py::ssize_t>(mat.type.channel_bytes());
   const auto step = static_cast<py::ssize_t>(mat.stride_bytes);
   if (mat.type.channels == 1) return py::array(type, {mat.rows, mat.cols}, {step, item}, mat.data, owner);
+  if (mat.type == vision::kFlow)
+    return py::array(type, {mat.rows, mat.cols, 2}, {step, 2 * item, item}, mat.data, owner);
   return py::array(type, {mat.rows, mat.cols, 3}, {step, 3 * item, -item}, mat.data + 2 * item, owner);  // BGR read RGB
 }
 

@@ -3,6 +3,7 @@
 
 #include <pybind11/stl.h>
 
+#include <array>
 #include <mutex>
 
 #include "egosgm/vision/synthetic.h"
@@ -65,6 +66,8 @@ StereoOdometryOptions odometry_options_of(const py::kwargs& values) {
 namespace {
 
 using vision::SyntheticFrame;
+using vision::SyntheticObject;
+using vision::SyntheticSceneFlow;
 using vision::SyntheticSequence;
 
 /// One frame after the other, also where several Python threads call.
@@ -110,6 +113,43 @@ void bind_synthetic(py::module_& module) {
   frame.def_property_readonly("world_from_camera",
                               [](const SyntheticFrame& f) { return array_of(f.world_from_camera); });
 
+  py::class_<SyntheticObject>(module, "SyntheticObject", "What moves by itself and shows in a left image.")
+      .def_readonly("id", &SyntheticObject::id, "Its pixels in SyntheticSceneFlow.objects.")
+      .def_property_readonly(
+          "box",
+          [](const SyntheticObject& o) {
+            return std::array{o.left, o.top, o.right, o.bottom};
+          },
+          "[left, top, right, bottom] of its pixels, all four within it.")
+      .def_property_readonly(
+          "centre_m",
+          [](const SyntheticObject& o) {
+            return std::array{o.centre_m.x(), o.centre_m.y(), o.centre_m.z()};
+          },
+          "In the camera's frame.")
+      .def_property_readonly(
+          "velocity_m",
+          [](const SyntheticObject& o) {
+            return std::array{o.velocity_m.x(), o.velocity_m.y(), o.velocity_m.z()};
+          },
+          "Its own, without the camera's, per frame, in the camera's frame.")
+      .def_property_readonly(
+          "next_from_current", [](const SyntheticObject& o) { return array_of(o.next_from_current); },
+          "Moves its points from this camera's frame to the next one's.");
+
+  auto scene_flow = py::class_<SyntheticSceneFlow>(
+      module, "SyntheticSceneFlow", "Where the surfaces of a left image are one frame later, hidden ones too.");
+  const std::pair<const char*, vision::Image SyntheticSceneFlow::*> flow_maps[] = {
+      {"flow", &SyntheticSceneFlow::flow},
+      {"next_disparity", &SyntheticSceneFlow::next_disparity},
+      {"seen_next", &SyntheticSceneFlow::seen_next},
+      {"objects", &SyntheticSceneFlow::objects}};
+  for (const auto& [name, member] : flow_maps) {
+    scene_flow.def_property_readonly(name,
+                                     [member = member](const SyntheticSceneFlow& f) { return array_of(f.*member); });
+  }
+  scene_flow.def_readonly("moving", &SyntheticSceneFlow::moving, "The objects with flow, by id.");
+
   py::class_<SyntheticSequence>(module, "SyntheticSequence",
                                 "A drive through a synthetic street with exact truth; frames are rendered on demand. "
                                 "Options as keyword arguments: see synthetic_options().")
@@ -122,7 +162,9 @@ void bind_synthetic(py::module_& module) {
       .def_property_readonly("options", [](const SyntheticSequence& s) { return dict_of_fields(s.options()); })
       .def_property_readonly("calibration", &SyntheticSequence::calibration)
       .def("motion", &SyntheticSequence::motion, py::arg("frame"), "From the frame before; identity for frame 0.")
-      .def("render", &SyntheticSequence::render, py::arg("frame"), py::call_guard<py::gil_scoped_release>());
+      .def("render", &SyntheticSequence::render, py::arg("frame"), py::call_guard<py::gil_scoped_release>())
+      .def("scene_flow", &SyntheticSequence::scene_flow, py::arg("frame"), py::call_guard<py::gil_scoped_release>(),
+           "From the frame to the one after it.");
   module.def(
       "synthetic_options", [] { return dict_of_fields(vision::SyntheticOptions{}); },
       "All options of SyntheticSequence with their defaults.");

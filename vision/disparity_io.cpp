@@ -192,6 +192,22 @@ std::int64_t write_disparity_png(const std::filesystem::path& file, const Image&
   return count_outside_png(disparity);
 }
 
+void write_flow_png(const std::filesystem::path& file, const Image& flow) {
+  if (flow.type != kFlow) throw InvalidArgument(file.string() + ": only an optical flow can be written");
+  const auto steps = [](float px) { return std::round(px * 64 + 32768); };
+  Image stored(flow.size(), kBgr16, 0);
+  for (int y = 0; y < flow.rows; ++y) {
+    const auto* from = flow.row<float>(y);
+    auto* to = stored.row<std::uint16_t>(y);
+    for (int x = 0; x < flow.cols; ++x, from += 2, to += 3) {
+      const float u = steps(from[0]), v = steps(from[1]);
+      if (!(u >= 0 && u <= 65535 && v >= 0 && v <= 65535)) continue;
+      to[0] = 1, to[1] = static_cast<std::uint16_t>(v), to[2] = static_cast<std::uint16_t>(u);
+    }
+  }
+  write_png(file, stored);
+}
+
 std::int64_t count_outside_png(const Image& disparity) {
   if (disparity.type != kF32) throw InvalidArgument("count_outside_png: the map must be float32");
   std::int64_t outside = 0;

@@ -121,9 +121,8 @@ PixelType read_pixel_type(const std::filesystem::path& file) {
 
 void write_png(const std::filesystem::path& file, const Image& image) {
   const ImageType type = image.type;
-  if (image.empty() || (type != kU8 && type != kBgr8 && type != kU16)) {
-    throw InvalidArgument(file.string() +
-                          ": only non-empty images of 8 or 16 bit grey or 8 bit BGR are written as PNG");
+  if (image.empty() || type.channel == ChannelType::kF32 || (type.channels != 1 && type.channels != 3)) {
+    throw InvalidArgument(file.string() + ": only non-empty images of 8 or 16 bit grey or BGR are written as PNG");
   }
   write_file(file, encode_plain_png(image));
 }

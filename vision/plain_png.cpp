@@ -132,22 +132,20 @@ bool unfilter(int filter, const std::uint8_t* above, std::uint8_t* row, std::siz
                       : unfilter<3>(filter, above, row, count);
 }
 
-/// A row's bytes in the order of files, and back: of 16 bits the upper ones first, of colours red.
-void swap_order(ImageType type, const std::uint8_t* from, std::uint8_t* to, std::size_t count) {
-  if (type == kU8) {
-    std::copy_n(from, count, to);
-  } else if (type == kU16) {
-    for (std::size_t i = 0; i + 1 < count; i += 2) {
-      to[i] = from[i + 1];
-      to[i + 1] = from[i];
-    }
-  } else {
-    for (std::size_t i = 0; i + 2 < count; i += 3) {
-      to[i] = from[i + 2];
-      to[i + 1] = from[i + 1];
-      to[i + 2] = from[i];
-    }
+template <int kPixel>
+void reverse_pixels(const std::uint8_t* from, std::uint8_t* to, std::size_t count) {
+  for (std::size_t i = 0; i + kPixel <= count; i += kPixel) {
+    for (int byte = 0; byte < kPixel; ++byte) to[i + byte] = from[i + kPixel - 1 - byte];
   }
+}
+
+/// A row's bytes in the order of files, and back: of 16 bits the upper ones first, of colours red.
+void swap_order(std::size_t pixel, const std::uint8_t* from, std::uint8_t* to, std::size_t count) {
+  const auto reverse = pixel == 1   ? reverse_pixels<1>
+                       : pixel == 2 ? reverse_pixels<2>
+                       : pixel == 3 ? reverse_pixels<3>
+                                    : reverse_pixels<6>;
+  reverse(from, to, count);
 }
 
 /// Each row's filter, and its bytes as that leaves them: the differences to the pixel before, as disparities and grey
@@ -157,7 +155,7 @@ Bytes filtered_rows(const Image& image) {
   Bytes all((1 + count) * static_cast<std::size_t>(image.rows)), row(count);
   std::uint8_t* next = all.data();
   for (int y = 0; y < image.rows; ++y, next += count) {
-    swap_order(image.type, image.row(y), row.data(), count);
+    swap_order(pixel, image.row(y), row.data(), count);
     *next++ = kSub;
     std::copy_n(row.data(), pixel, next);
     for (std::size_t i = pixel; i < count; ++i) next[i] = static_cast<std::uint8_t>(row[i] - row[i - pixel]);
@@ -224,7 +222,7 @@ std::optional<Image> decode_plain_png(std::string_view bytes, Size size, const s
     const int filter = *row++;
     if (!unfilter(filter, above, row, count, pixel)) return {};
     if (type == kU16) {
-      swap_order(type, row, pixels.row(y), count);
+      swap_order(pixel, row, pixels.row(y), count);
     } else {
       std::copy_n(row, count, pixels.row(y));
     }

@@ -16,7 +16,7 @@ namespace egosgm::vision {
 /// REQUIRES: bytes that parse_png_size took, and `size` of it.
 std::optional<Image> decode_plain_png(std::string_view bytes, Size size, const std::filesystem::path& file);
 
-/// A file with these pixels. REQUIRES: kU8, kBgr8 (BGR) or kU16, not empty.
+/// A file with these pixels. REQUIRES: kU8, kBgr8, kU16 or kBgr16, not empty.
 std::string encode_plain_png(const Image& image);
 
 }  // namespace egosgm::vision

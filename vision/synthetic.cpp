@@ -65,6 +65,18 @@ void write_frame(const SyntheticFrame& frame, const std::string& name, bool with
   write_png(truth / "right_moving" / name, frame.right_moving);
 }
 
+constexpr const char* kObjectColumns =
+    "frame,id,left,top,right,bottom,x_m,y_m,z_m,vx_m,vy_m,vz_m,m00,m01,m02,m03,m10,m11,m12,m13,m20,m21,m22,m23\n";
+
+std::string object_row(int frame, const SyntheticObject& object) {
+  std::string row =
+      text(frame, ",", object.id, ",", object.left, ",", object.top, ",", object.right, ",", object.bottom);
+  for (const double value : object.centre_m) row += text(",", value);
+  for (const double value : object.velocity_m) row += text(",", value);
+  for (int i = 0; i < 12; ++i) row += text(",", object.next_from_current(i / 4, i % 4));
+  return row + "\n";
+}
+
 }  // namespace
 
 void SyntheticOptions::validate() const {
@@ -129,6 +141,13 @@ SyntheticFrame SyntheticSequence::render(int frame) const {
   return out;
 }
 
+SyntheticSceneFlow SyntheticSequence::scene_flow(int frame) const {
+  world_from_camera(frame);  // refuses frames that do not exist
+  SyntheticSceneFlow out;
+  synthetic::find_scene_flow(scene_->street, frame, out);
+  return out;
+}
+
 void write_sequence(const SyntheticOptions& options, const std::filesystem::path& folder,
                     const std::function<void(int done, int frames)>& progress) {
   const SyntheticSequence sequence(options);
@@ -137,9 +156,13 @@ void write_sequence(const SyntheticOptions& options, const std::filesystem::path
     for (const char* map : {"disp_occ", "disp_noc"}) make_folder(folder / (view + map));
     if (options.moving_object) make_folder(folder / (view + "moving"));
   }
+  const std::filesystem::path truth = folder / "truth";
+  for (const char* map : {"flow", "disp_1", "seen_next", "objects"}) {
+    if (options.moving_object) make_folder(truth / map);
+  }
 
   std::vector<Eigen::Isometry3d> poses;
-  std::string times;
+  std::string times, objects = kObjectColumns;
   for (int k = 0; k < options.frames; ++k) {
     poses.push_back(sequence.world_from_camera(k));
     times += text(0.1 * k, "\n");
@@ -148,9 +171,21 @@ void write_sequence(const SyntheticOptions& options, const std::filesystem::path
   write_file(folder / "times.txt", times);
   write_poses(folder / "poses.txt", poses);
   for (int k = 0; k < options.frames; ++k) {
-    write_frame(sequence.render(k), padded(std::to_string(k), 6) + ".png", options.moving_object, folder);
+    const std::string name = padded(std::to_string(k), 6) + ".png";
+    write_frame(sequence.render(k), name, options.moving_object, folder);
+    if (options.moving_object) {
+      const SyntheticSceneFlow next = sequence.scene_flow(k);
+      write_png(truth / "objects" / name, next.objects);
+      if (k + 1 < options.frames) {
+        write_flow_png(truth / "flow" / name, next.flow);
+        write_disparity_png(truth / "disp_1" / name, next.next_disparity);
+        write_png(truth / "seen_next" / name, next.seen_next);
+        for (const SyntheticObject& object : next.moving) objects += object_row(k, object);
+      }
+    }
     if (progress) progress(k + 1, options.frames);
   }
+  if (options.moving_object) write_file(truth / "objects.csv", objects);
 }
 
 }  // namespace egosgm::vision

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "vision/synthetic_texture.h"
 
@@ -266,7 +267,7 @@ void render_view(const View& view, const View& other, int towards_other, const s
       const bool seen = inside && numerator / other.cast(there, y).depth_m <= d + kSameSurface_px;
       out.disparity.at<float>(y, x) = static_cast<float>(d);
       out.noc.at<uint8_t>(y, x) = seen ? 255 : 0;
-      out.moving.at<uint8_t>(y, x) = hit.solid >= 0 && solids[hit.solid].moving ? 255 : 0;
+      out.moving.at<uint8_t>(y, x) = hit.solid >= 0 && solids[hit.solid].id ? 255 : 0;
       out.image.at<uint8_t>(y, x) = expose(pixel_radiance(view, x, y, hit, options.supersampling), camera, x, y, gain,
                                            noise_seed, options.noise_grey);
     }
@@ -291,6 +292,86 @@ void render_pair(const Street& street, int frame, SyntheticFrame& out) {
               {out.left, out.left_disparity, out.left_noc, out.left_moving});
   render_view(right_view, left_view, 1, solids, street.options, mix(seed, 1),
               {out.right, out.right_disparity, out.right_noc, out.right_moving});
+}
+
+namespace {
+
+Eigen::Isometry3d world_from_solid(const Solid& solid) {
+  Eigen::Isometry3d pose(Eigen::Translation3d(solid.centre));
+  for (int axis = 0; axis < 3; ++axis) pose.linear().col(axis) = to_world(solid, Eigen::Vector3d::Unit(axis));
+  return pose;
+}
+
+/// What moves by itself and is there at both times, by its id; boxes are empty.
+std::map<int, SyntheticObject> find_objects(const std::vector<Solid>& solids, const std::vector<Solid>& next_solids,
+                                            const Camera& camera, const Camera& next) {
+  std::map<int, SyntheticObject> objects;
+  for (auto solid = solids.begin(); solid != solids.end(); ++solid) {
+    const auto is_same = [&](const Solid& other) { return other.id == solid->id; };
+    const auto then = std::find_if(next_solids.begin(), next_solids.end(), is_same);
+    if (solid->id == 0 || objects.count(solid->id) || then == next_solids.end()) continue;
+    double top = std::numeric_limits<double>::infinity(), bottom = -top;
+    for (auto part = solid; part != solids.end(); ++part) {
+      if (!is_same(*part)) continue;
+      top = std::min(top, part->centre.y() - part->half.y());
+      bottom = std::max(bottom, part->centre.y() + part->half.y());
+    }
+    const Eigen::Vector3d centre(solid->centre.x(), 0.5 * (top + bottom), solid->centre.z());
+    const Eigen::Isometry3d motion = world_from_solid(*then) * world_from_solid(*solid).inverse(),
+                            camera_from_world = camera.world_from_camera.inverse();
+    SyntheticObject& object = objects[solid->id];
+    object.id = solid->id;
+    object.left = camera.width, object.top = camera.height;
+    object.centre_m = camera_from_world * centre;
+    object.velocity_m = camera_from_world.linear() * (motion * centre - centre);
+    object.next_from_current = next.world_from_camera.inverse() * motion * camera.world_from_camera;
+  }
+  return objects;
+}
+
+}  // namespace
+
+void find_scene_flow(const Street& street, int frame, SyntheticSceneFlow& out) {
+  const std::vector<Solid> solids = street.solids(frame), next_solids = street.solids(frame + 1);
+  const Camera camera = left_camera(street, frame), next = left_camera(street, frame + 1);
+  const View view(street, solids, camera), next_view(street, next_solids, next);
+  const double numerator = camera.focal_px * kBaseline_m;
+  const Eigen::Isometry3d of_camera = next.world_from_camera.inverse() * camera.world_from_camera;
+  std::map<int, SyntheticObject> objects = find_objects(solids, next_solids, camera, next);
+  const Size size(camera.width, camera.height);
+  out.flow = Image(size, kFlow, std::numeric_limits<float>::quiet_NaN());
+  out.next_disparity = Image(size, kF32, kInvalidDisparity);
+  out.seen_next = Image(size, kU8, 0), out.objects = Image(size, kU8, 0);
+  for (int y = 0; y < camera.height; ++y) {
+    for (int x = 0; x < camera.width; ++x) {
+      const Hit hit = view.cast(x, y);
+      const uint8_t id = hit.solid >= 0 ? solids[hit.solid].id : 0;
+      out.objects.at<uint8_t>(y, x) = id;
+      const auto object = objects.find(id);
+      if (id && object == objects.end()) continue;
+      if (id) {
+        SyntheticObject& o = object->second;
+        o.left = std::min(o.left, x), o.right = std::max(o.right, x);
+        o.top = std::min(o.top, y), o.bottom = std::max(o.bottom, y);
+      }
+      const Eigen::Isometry3d& motion = id ? object->second.next_from_current : of_camera;
+      const Eigen::Vector3d ray((x - camera.cx) / camera.focal_px, (y - camera.cy) / camera.focal_px, 1);
+      const Eigen::Vector3d there = motion.linear() * ray + motion.translation() / hit.depth_m;  // by the depth
+      if (there.z() <= 0) continue;
+      const double next_x = camera.cx + camera.focal_px * there.x() / there.z(),
+                   next_y = camera.cy + camera.focal_px * there.y() / there.z(),
+                   d = numerator / (hit.depth_m * there.z());
+      float* flow = out.flow.row<float>(y) + 2 * x;
+      flow[0] = static_cast<float>(next_x - x), flow[1] = static_cast<float>(next_y - y);
+      out.next_disparity.at<float>(y, x) = static_cast<float>(d);
+      const bool inside = next_x >= -0.5 && next_x < size.width - 0.5 && next_y >= -0.5 && next_y < size.height - 0.5;
+      const bool seen = inside && numerator / next_view.cast(next_x, next_y).depth_m <= d + kSameSurface_px;
+      out.seen_next.at<uint8_t>(y, x) = seen ? 255 : 0;
+    }
+  }
+  for (const auto& [id, object] : objects) {
+    if (object.right >= 0) out.moving.push_back(object);
+  }
 }
 
 }  // namespace egosgm::vision::synthetic

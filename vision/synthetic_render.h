@@ -60,6 +60,9 @@ class View {
 /// Fills all maps of a frame but the pose.
 void render_pair(const Street& street, int frame, SyntheticFrame& out);
 
+/// Fills all of it.
+void find_scene_flow(const Street& street, int frame, SyntheticSceneFlow& out);
+
 Camera left_camera(const Street& street, int frame);
 inline constexpr double kBaseline_m = 0.54;
 

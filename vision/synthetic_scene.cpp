@@ -256,7 +256,7 @@ void Street::add_moving(int frame, std::vector<Solid>& out) const {
   const double gap = 11 + 2 * std::sin(kTwoPi * frame / 45), weave = 1.2 * std::sin(kTwoPi * frame / 33);
   Solid ahead = place(Shape::kBox, Material::kVan, mix(options.seed, 31), s + gap + length / 2, weave, 0,
                       {1.9 * scale, 1.9 * scale, length});
-  ahead.moving = true;
+  ahead.id = 1;
   out.push_back(ahead);
 
   const int round = frame / kCrossingFrames;
@@ -267,7 +267,7 @@ void Street::add_moving(int frame, std::vector<Solid>& out) const {
   Solid body = place(Shape::kBox, Material::kBody, seed, at, lateral, 0, {1.6, 0.85, 3.4});
   Solid cabin = place(Shape::kBox, Material::kCabin, seed, at, lateral, 0.85, {1.4, 0.55, 1.9});
   for (Solid* solid : {&body, &cabin}) {
-    solid->moving = true;
+    solid->id = static_cast<uint8_t>(2 + round % 254);
     const double sine = solid->sin_heading, cosine = solid->cos_heading;
     solid->sin_heading = side * cosine, solid->cos_heading = -side * sine;  // turned by a right angle
     out.push_back(*solid);
@@ -284,7 +284,7 @@ void Street::add_people(int frame, std::vector<Solid>& out) const {
     Solid body = place(Shape::kEllipsoid, Material::kCloth, mix(h, 3), i * kApart_m, lateral, 0, {0.5, 1.5, 0.35});
     Solid head = place(Shape::kEllipsoid, Material::kCloth, mix(h, 4), i * kApart_m, lateral, 1.45, {0.22, 0.28, 0.24});
     for (Solid* solid : {&body, &head}) {
-      solid->moving = options.moving_object;
+      solid->id = options.moving_object ? static_cast<uint8_t>(1 + i % 255) : 0;
       out.push_back(*solid);
     }
   }

@@ -59,7 +59,7 @@ enum class Material : uint8_t { kFacade, kBlock, kBody, kCabin, kVan, kPole, kSi
 struct Solid {
   Shape shape;
   Material material;
-  bool moving = false;
+  uint8_t id = 0;  // of what moves by itself; the solids of one share it, stand on each other and turn together
   uint32_t seed;
   Eigen::Vector3d centre;
   Eigen::Vector3d half;

@@ -16,7 +16,9 @@ class Synth(ProgramTest):
         self.assert_works("synth", "--out", street, "--frames", 2, "--width", 160, "--height", 64, "--moving-object")
         for folder in ("image_0", "image_1", "truth/left_disp_occ", "truth/right_disp_noc", "truth/left_moving"):
             self.assertEqual([f.name for f in sorted((street / folder).iterdir())], ["000000.png", "000001.png"], folder)
-        for file in ("calib.txt", "poses.txt", "times.txt"):
+        for folder in ("flow", "disp_1", "seen_next"):
+            self.assertEqual([f.name for f in (street / "truth" / folder).iterdir()], ["000000.png"], folder)
+        for file in ("calib.txt", "poses.txt", "times.txt", "truth/objects.csv"):
             self.assertTrue((street / file).read_text().strip(), file)
 
     def test_a_plain_street_has_a_sky(self):

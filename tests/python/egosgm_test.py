@@ -346,6 +346,22 @@ def test_a_reason_tells_why_a_pixel_has_no_value():
     assert missing[unconfirmed].all()
 
 
+def test_scene_flow_is_the_truth_of_what_moves():
+    street = egosgm.SyntheticSequence(frames=2, width=160, height=64, moving_object=True)
+    frame, truth = street.render(0), street.scene_flow(0)
+    assert truth.flow.shape == (64, 160, 2) and truth.next_disparity.shape == truth.seen_next.shape == (64, 160)
+    np.testing.assert_array_equal(truth.objects > 0, frame.left_moving > 0)
+    camera = street.calibration
+    for thing in truth.moving:
+        rows, columns = np.nonzero(truth.objects == thing.id)
+        assert list(thing.box) == [columns.min(), rows.min(), columns.max(), rows.max()]
+        y, x = rows[0], columns[0]
+        depth = camera.fx * camera.baseline_m / frame.left_disparity[y, x]
+        there = thing.next_from_current @ [(x - camera.cx) / camera.fx * depth, (y - camera.cy) / camera.fy * depth, depth, 1]
+        np.testing.assert_allclose(truth.flow[y, x], [camera.fx * there[0] / there[2] + camera.cx - x, camera.fy * there[1] / there[2] + camera.cy - y], atol=1e-3)
+        assert len(thing.centre_m) == len(thing.velocity_m) == 3
+
+
 def test_the_dynamic_map_finds_what_moves():
     street = egosgm.SyntheticSequence(frames=8, moving_object=True)
     pipeline = egosgm.Pipeline(street.calibration, 640, 240)

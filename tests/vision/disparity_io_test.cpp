@@ -51,6 +51,22 @@ TEST_F(DisparityIo, PngStoresAsTheDevelopmentKit) {
   EXPECT_THROW(count_outside_png(png), InvalidArgument);
 }
 
+TEST_F(DisparityIo, FlowIsStoredIn64StepsAPixel) {
+  const std::pair<std::pair<float, float>, std::vector<int>> cases[] = {
+      {{0, 0}, {1, 32768, 32768}},      {{-1.5f, 2.25f}, {1, 32912, 32672}},
+      {{-512, 511.98f}, {1, 65535, 0}}, {{NAN, 1}, {0, 0, 0}},
+      {{1, kInf}, {0, 0, 0}},           {{512, 0}, {0, 0, 0}}};
+  for (const auto& [uv, stored] : cases) {
+    Image flow(1, 1, kFlow);
+    flow.row<float>(0)[0] = uv.first, flow.row<float>(0)[1] = uv.second;
+    write_flow_png(folder_ / "f.png", flow);
+    const Image png = read_stored_image(folder_ / "f.png");
+    ASSERT_EQ(png.type, kBgr16);
+    for (int i = 0; i < 3; ++i) EXPECT_EQ(png.row<std::uint16_t>(0)[i], stored[i]) << uv.first << ", " << i;
+  }
+  expect_refused([&] { write_flow_png(file_, Image(1, 1, kF32, 0)); }, {file_.string()});
+}
+
 TEST_F(DisparityIo, PngReadsValueBy256) {
   Image stored(1, 4, kU16);
   const std::uint16_t values[] = {0, 1, 25728, 65535};

@@ -101,7 +101,9 @@ TEST_F(ImageIo, ColorIsReadAsItIs) {
   const cv::Mat image = random_image(random, 33, 7, CV_8UC3);
   write_png(file_, image);
   expect_equal(read_color_image(file_), image);
-  cv::Mat deep;
+  cv::Mat deep = random_image(random, 33, 7, CV_16UC3);
+  write_png(file_, deep);
+  expect_equal(cv::imread(file_.string(), cv::IMREAD_UNCHANGED), deep);
   for (const int lower_byte : {0, 255}) {
     image.convertTo(deep, CV_16U, 256, lower_byte);
     ASSERT_TRUE(cv::imwrite((folder_ / "deep.png").string(), deep));

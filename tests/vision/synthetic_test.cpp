@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <iterator>
 #include <numeric>
 #include <set>
+#include <sstream>
 #include <string>
 
 #include "egosgm/error.h"
@@ -125,6 +127,79 @@ TEST(Synthetic, MovingMaskIsEmptyWithoutTheOption) {
   options.moving_object_scale = 5;
   const SyntheticFrame large = SyntheticSequence(options).render(4);
   EXPECT_GT(count_nonzero(large.left_moving), 0.3 * large.left.pixels());
+}
+
+TEST(Synthetic, SceneFlowLeadsToTheNextFrameAndSaysWhatIsSeenThere) {
+  SyntheticOptions options = small_options();
+  options.turn_deg = 2.7, options.noise_grey = 0;
+  for (const bool plain : {false, true}) {
+    options.plain = plain, options.moving_object = true;
+    const SyntheticSequence sequence(options);
+    const SyntheticFrame frame = sequence.render(7), next = sequence.render(8);
+    const SyntheticSceneFlow flow = sequence.scene_flow(7), then = sequence.scene_flow(8);
+    int counts[2] = {}, agree[2] = {}, hidden = 0, behind = 0, same = 0;
+    double grey_difference = 0;
+    for (int y = 0; y < frame.left.rows; ++y) {
+      for (int x = 0; x < frame.left.cols; ++x) {
+        const int id = flow.objects.at<uint8_t>(y, x), moves = id != 0;
+        ASSERT_EQ(moves, frame.left_moving.at<uint8_t>(y, x) != 0) << "at " << x << ", " << y;
+        const float *uv = flow.flow.row<float>(y) + 2 * x, d = flow.next_disparity.at<float>(y, x);
+        const double u = x + uv[0], v = y + uv[1];
+        const bool seen = flow.seen_next.at<uint8_t>(y, x) != 0;
+        if (u < -0.5 || v < -0.5 || u > frame.left.cols - 0.5 || v > frame.left.rows - 0.5) {
+          ASSERT_FALSE(seen) << "at " << x << ", " << y;
+        }
+        if (!(u >= 0 && v >= 0 && u <= frame.left.cols - 1 && v <= frame.left.rows - 1)) continue;
+        const Range there = around(next.left_disparity, u, v);
+        hidden += !seen, behind += !seen && there.high > d;
+        if (!seen) continue;
+        ++counts[moves];
+        agree[moves] += d > there.low - 0.03 && d < there.high + 0.03;
+        same += then.objects.at<uint8_t>(static_cast<int>(std::lround(v)), static_cast<int>(std::lround(u))) == id;
+        grey_difference += std::abs(frame.left.at<uint8_t>(y, x) - linear(next.left, u, v));
+      }
+    }
+    const int all = counts[0] + counts[1];
+    EXPECT_GT(counts[0], 20000) << "plain " << plain;
+    EXPECT_GT(counts[1], plain ? 50 : 500) << "plain " << plain;
+    for (const int moves : {0, 1}) EXPECT_GT(agree[moves], 0.98 * counts[moves]) << "plain " << plain << moves;
+    EXPECT_GT(behind, 0.95 * hidden) << "plain " << plain;
+    EXPECT_GT(same, 0.99 * all) << "plain " << plain;
+    EXPECT_LT(grey_difference, 7.0 * all) << "plain " << plain;
+  }
+}
+
+TEST(Synthetic, ObjectsMoveAsTheirMotionsSay) {
+  SyntheticOptions options = small_options();
+  options.frames = 30, options.moving_object = true;
+  const SyntheticSequence sequence(options);
+  int crossing = 0;
+  for (int k = 0; k < 29; ++k) {
+    const SyntheticSceneFlow flow = sequence.scene_flow(k), then = sequence.scene_flow(k + 1);
+    Image uncounted = flow.objects.clone();
+    for (const SyntheticObject& object : flow.moving) {
+      crossing += object.id > 1;
+      for (const SyntheticObject& next : then.moving) {
+        if (next.id != object.id) continue;
+        EXPECT_TRUE((object.next_from_current * object.centre_m).isApprox(next.centre_m, 1e-9)) << object.id;
+        const Eigen::Isometry3d of_camera = sequence.motion(k + 1).current_from_previous;
+        EXPECT_TRUE((of_camera * (object.centre_m + object.velocity_m)).isApprox(next.centre_m, 1e-9)) << object.id;
+      }
+      bool touches[4] = {};
+      for (int y = object.top; y <= object.bottom; ++y) {
+        for (int x = object.left; x <= object.right; ++x) {
+          uint8_t& id = uncounted.at<uint8_t>(y, x);
+          if (id != object.id) continue;
+          touches[0] |= x == object.left, touches[1] |= x == object.right;
+          touches[2] |= y == object.top, touches[3] |= y == object.bottom;
+          id = 0;
+        }
+      }
+      EXPECT_TRUE(touches[0] && touches[1] && touches[2] && touches[3]) << "frame " << k << ", " << object.id;
+    }
+    EXPECT_TRUE(k == 24 || count_nonzero(uncounted) == 0) << "frame " << k << ": then a vehicle leaves the street";
+  }
+  EXPECT_GT(crossing, 10);
 }
 
 /// Mean |left(x) - right(x - d - error)| over pixels that both cameras see, right linearly interpolated.
@@ -382,6 +457,37 @@ TEST_F(SyntheticFiles, SequenceReadsBackAsItWasRendered) {
       ASSERT_EQ(noc.at<float>(y, x), expected) << "at " << x << ", " << y;
     }
   }
+
+  const SyntheticSceneFlow next = sequence.scene_flow(0);
+  const Image flow = read_stored_image(folder_ / "truth/flow/000000.png");
+  ASSERT_EQ(flow.type, kBgr16);
+  for (int x = 0; x < flow.cols; ++x) {
+    const uint16_t* stored = flow.row<uint16_t>(30) + 3 * x;
+    const float* truth = next.flow.row<float>(30) + 2 * x;
+    EXPECT_EQ(stored[0], 1);
+    EXPECT_NEAR((stored[2] - 32768) / 64.0, truth[0], 0.5 / 64 + 1e-4);
+    EXPECT_NEAR((stored[1] - 32768) / 64.0, truth[1], 0.5 / 64 + 1e-4);
+  }
+  EXPECT_LE(largest_difference(read_disparity(folder_ / "truth/disp_1/000000.png"), next.next_disparity), 1.0 / 256);
+  EXPECT_TRUE(same_bits(read_stored_image(folder_ / "truth/seen_next/000000.png"), next.seen_next));
+  EXPECT_TRUE(same_bits(read_stored_image(folder_ / "truth/objects" / name), sequence.scene_flow(1).objects));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "truth/flow" / name)) << "no frame follows it";
+  std::ifstream csv(folder_ / "truth/objects.csv");
+  std::string line;
+  std::getline(csv, line);
+  EXPECT_EQ(line.substr(0, 9), "frame,id,");
+  for (const SyntheticObject& object : next.moving) {
+    std::getline(csv, line);
+    std::replace(line.begin(), line.end(), ',', ' ');
+    std::istringstream numbers(line);
+    const std::vector<double> row{std::istream_iterator<double>(numbers), {}};
+    ASSERT_EQ(row.size(), 24u);
+    EXPECT_EQ(std::vector<double>(row.begin(), row.begin() + 3),
+              std::vector<double>({0, 1.0 * object.id, 1.0 * object.left}));
+    EXPECT_NEAR(row[8], object.centre_m.z(), 1e-6);
+    EXPECT_NEAR(row[23], object.next_from_current(2, 3), 1e-6);
+  }
+  EXPECT_FALSE(std::getline(csv, line)) << line;
 
   const Calibration read = read_calibration(folder_ / "calib.txt"), truth = sequence.calibration();
   EXPECT_NEAR(read.fx, truth.fx, 1e-9);

@@ -39,6 +39,10 @@ EGOSGM_EXPORT std::int64_t write_disparity_png(const std::filesystem::path& file
 /// How many valid pixels of a kF32 map that PNG has no room for.
 EGOSGM_EXPORT std::int64_t count_outside_png(const Image& disparity);
 
+/// KITTI's PNG of an optical flow, kFlow, (u, v) in px: 16-bit RGB, red = 64 u + 32768, green likewise of v, blue = 1.
+/// All three are 0 where u or v is not finite or outside of what 16 bits hold, -512 to 511.98 px.
+EGOSGM_EXPORT void write_flow_png(const std::filesystem::path& file, const Image& flow);
+
 /// One-channel PFM (Middlebury): rows bottom-up, byte order by the scale's sign, infinity or NaN = invalid.
 EGOSGM_EXPORT Image read_pfm(const std::filesystem::path& file);
 

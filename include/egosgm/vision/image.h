@@ -39,7 +39,7 @@ struct ImageType {
 };
 
 inline constexpr ImageType kU8{ChannelType::kU8}, kU16{ChannelType::kU16}, kF32{ChannelType::kF32},
-    kBgr8{ChannelType::kU8, 3}, kBgr16{ChannelType::kU16, 3};
+    kBgr8{ChannelType::kU8, 3}, kBgr16{ChannelType::kU16, 3}, kFlow{ChannelType::kF32, 2};
 
 /// A pixel of kBgr8: blue, green, red.
 using Color = std::array<std::uint8_t, 3>;

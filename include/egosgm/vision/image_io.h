@@ -41,7 +41,7 @@ EGOSGM_EXPORT Size read_image_size(const std::filesystem::path& file);
 /// it cannot be read.
 EGOSGM_EXPORT PixelType read_pixel_type(const std::filesystem::path& file);
 
-/// Writes kU8, kBgr8 (BGR) or kU16, whole or not at all. Throws IoError, and InvalidArgument for another type
+/// Writes kU8, kBgr8, kU16 or kBgr16, whole or not at all. Throws IoError, and InvalidArgument for another type
 /// or an empty image. Thread-safe for different files.
 EGOSGM_EXPORT void write_png(const std::filesystem::path& file, const Image& image);
 

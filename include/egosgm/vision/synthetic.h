@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <vector>
 
 #include "egosgm/calibration.h"
 #include "egosgm/export.h"
@@ -46,6 +47,25 @@ struct SyntheticFrame {
   Eigen::Isometry3d world_from_camera;    // left camera's pose; identity for frame 0
 };
 
+/// What moves by itself and shows in the left image of a frame.
+struct SyntheticObject {
+  int id = 0;                                      // 1..255, its pixels in SyntheticSceneFlow::objects
+  int left = 0, top = 0, right = -1, bottom = -1;  // box of its pixels, all four within it
+  Eigen::Vector3d centre_m, velocity_m;  // in the camera's frame; velocity: its own, without the camera's, per frame
+  Eigen::Isometry3d next_from_current;   // its points, from this camera's frame to the next one's
+};
+
+/// Where the surfaces of a left image are one frame later, exact at each pixel's centre, also where they are hidden
+/// then. A pixel has no flow and no next disparity where its surface comes to lie behind the camera, or belongs to a
+/// vehicle that leaves the street.
+struct SyntheticSceneFlow {
+  Image flow;            // kFlow: (u, v) to the next left image [px], NaN where there is none
+  Image next_disparity;  // kF32: disparity in the next frame, at this frame's pixels; kInvalidDisparity likewise
+  Image seen_next;       // kU8: 255 where the next left image shows the same surface point, else 0
+  Image objects;         // kU8: ids of what moves by itself, else 0
+  std::vector<SyntheticObject> moving;  // those with flow, by id
+};
+
 /// Renders any frame of the drive on demand. Thread-safe: const calls may run at the same time.
 class EGOSGM_EXPORT SyntheticSequence {
  public:
@@ -66,6 +86,8 @@ class EGOSGM_EXPORT SyntheticSequence {
   /// The motion from frame - 1 to `frame`, covariance zero; identity for frame 0.
   Motion motion(int frame) const;
   SyntheticFrame render(int frame) const;
+  /// From `frame` to the one after it, which need not be below frames().
+  SyntheticSceneFlow scene_flow(int frame) const;
 
  private:
   struct Scene;
@@ -80,7 +102,13 @@ class EGOSGM_EXPORT SyntheticSequence {
 ///   truth/left_disp_occ/N.png             disparity of every pixel, KITTI's 16-bit PNG, 1 in a plain street's sky
 ///   truth/left_disp_noc/N.png             the same, 0 where the right camera does not see the point
 ///   truth/right_disp_occ, right_disp_noc  likewise for the right view
-///   truth/left_moving, right_moving       with moving_object only: 255 on moving objects
+/// With moving_object also:
+///   truth/left_moving, right_moving       255 on moving objects
+///   truth/objects/N.png                   8 bits: ids of the left view's moving objects, else 0
+///   truth/flow/N.png, truth/disp_1/N.png  of each frame but the last: optical flow to the next left image, and the
+///                                         disparity there, at this frame's pixels; KITTI's 16-bit PNG
+///   truth/seen_next/N.png                 likewise: 255 where the next left image shows the same point
+///   truth/objects.csv                     likewise, after the last frame: SyntheticObject by frame and id
 /// Every file appears whole or not at all; existing ones are replaced. `progress(done, frames)` is called after each
 /// frame, if given. Throws as SyntheticSequence does, and IoError.
 EGOSGM_EXPORT void write_sequence(const SyntheticOptions& options, const std::filesystem::path& folder,
