@@ -26,8 +26,9 @@ FrameResults Method::frame(const Plan& plan, const FrameImages& uploaded, const 
     result = confirmed(plan, after, given_out.disparity);
     const Prediction* prediction = plan.predicts() ? &w.prediction : nullptr;
     publish_.write(plan,
-                   {images, match_.matcher().codes(), prediction, measured, match_.speckle_runs(plan), after.maps,
-                    result, w.fusion.doubtful, evidence_of(plan, after), w.fusion.evidence.evidence, plan.grey_step},
+                   {{images, match_.matcher().codes(), plan.grey_step, measured, match_.speckle_runs(plan)},
+                    prediction,
+                    {after.maps, result, w.fusion.doubtful, evidence_of(plan, after), w.fusion.evidence.evidence}},
                    before, after, given_out.variance, w.published);
   });
   return {{result, given_out.variance}, measured, offset, images};

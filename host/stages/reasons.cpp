@@ -65,21 +65,21 @@ Reasons::Reasons(ocl::Context& context, shared::ImageSize size, PixelType type, 
       explain_(stage_, "explain") {}
 
 void Reasons::explain(const Inputs& inputs, Bytes& reasons) {
-  const cl_int has_prediction = inputs.prediction ? 1 : 0, has_runs = inputs.runs ? 1 : 0;
-  const Bytes& bytes = inputs.images.pixels;  // in place of what there is not
+  const auto& [match, prediction, fused] = inputs;
+  const cl_int has_prediction = prediction ? 1 : 0, has_runs = match.runs ? 1 : 0;
+  const Bytes& bytes = match.images.pixels;  // in place of what there is not
   const ocl::Buffer<cl_ushort> no_runs(bytes.get(), 1);
   if (has_census_) {
     const ocl::Range each_block =
         ocl::every_pixels(stage_.enter(), CoarseMatch::coarse_size(stage_.size()), stage_.pixels(), /*views=*/1);
-    stage_.launch(find_repeats_, each_block, stage_.size(), disparities_, padding_, inputs.codes,
-                  inputs.measured.disparity, repeats_);
+    stage_.launch(find_repeats_, each_block, stage_.size(), disparities_, padding_, match.codes,
+                  match.measured.disparity, repeats_);
   }
-  stage_.launch_pixels(
-      explain_, /*views=*/1, EGOSGM_LEAST_CHANGE * inputs.grey_step, bytes, has_census_, repeats_, has_prediction,
-      inputs.prediction ? inputs.prediction->warped.disparity : inputs.measured.disparity,
-      inputs.prediction ? inputs.prediction->hidden : bytes, inputs.measured.disparity, has_runs,
-      inputs.runs ? *inputs.runs : no_runs, inputs.given_out, inputs.doubtful, inputs.evidence != nullptr,
-      inputs.evidence ? *inputs.evidence : inputs.doubtful, inputs.block_evidence, reasons);
+  stage_.launch_pixels(explain_, /*views=*/1, EGOSGM_LEAST_CHANGE * match.grey_step, bytes, has_census_, repeats_,
+                       has_prediction, prediction ? prediction->warped.disparity : match.measured.disparity,
+                       prediction ? prediction->hidden : bytes, match.measured.disparity, has_runs,
+                       match.runs ? *match.runs : no_runs, fused.given_out, fused.doubtful, fused.evidence != nullptr,
+                       fused.evidence ? *fused.evidence : fused.doubtful, fused.block_evidence, reasons);
 }
 
 }  // namespace egosgm

@@ -13,19 +13,26 @@ class Reasons {
  public:
   using Bytes = ocl::Buffer<cl_uchar>;
 
-  /// Results of other stages.
-  struct Inputs {
+  /// Results of the match.
+  struct Match {
     const FrameImages& images;          // that were matched
     const ocl::Buffer<cl_uint>& codes;  // of both views (Census)
-    const Prediction* prediction;       // null: there is none
+    const float grey_step;              // Plan's
     const StereoMaps& measured;
     const ocl::Buffer<cl_ushort>* runs;  // of SpeckleRemoval; null: it is off
+  };
+  /// Results of fusion.
+  struct Fused {
     const StereoMaps& belief;
     const Map& given_out;                       // of its disparities
     const FlagMap& doubtful;                    // what KalmanUpdate says; not read without a prediction
     const FlagMap* evidence;                    // the same; null: the method has none
     const ocl::Buffer<cl_int>& block_evidence;  // of Evidence; not read without evidence
-    const float grey_step;                      // Plan's
+  };
+  struct Inputs {
+    const Match match;
+    const Prediction* prediction;  // null: there is none
+    const Fused fused;
   };
 
   /// A byte for each block of EGOSGM_COARSE x EGOSGM_COARSE pixels: whether its texture repeats.

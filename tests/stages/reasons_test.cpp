@@ -70,10 +70,11 @@ std::vector<cl_uchar> reasons_of(shared::ImageSize size, const MethodOptions& op
   ocl::Buffer<cl_uchar> found(context, pixel_count(size));
   found.write(context, std::vector<cl_uchar>(pixel_count(size), 99));  // must not shine through
   Reasons reasons(context, size, images.type, options, Reasons::repeats(context, size), pixels);
-  reasons.explain({images, codes, inputs.warped.empty() ? nullptr : &prediction, measured,
-                   options.speckle_removal.max_size_px > 0 ? &runs : nullptr, belief, belief.disparity, doubtful,
-                   inputs.evidence.empty() ? nullptr : &evidence, block_evidence, inputs.grey_step},
-                  found);
+  reasons.explain(
+      {{images, codes, inputs.grey_step, measured, options.speckle_removal.max_size_px > 0 ? &runs : nullptr},
+       inputs.warped.empty() ? nullptr : &prediction,
+       {belief, belief.disparity, doubtful, inputs.evidence.empty() ? nullptr : &evidence, block_evidence}},
+      found);
   return found.read(context);
 }
 
