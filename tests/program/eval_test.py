@@ -21,6 +21,9 @@ class Synth(ProgramTest):
         for file in ("calib.txt", "poses.txt", "times.txt", "truth/objects.csv"):
             self.assertTrue((street / file).read_text().strip(), file)
 
+        figures = json.loads(self.assert_works("eval-flow", street / "truth", street, "--json"))["regions"]["moving"]
+        self.assertEqual([(figures[name]["outliers_percent"], figures[name]["density_percent"]) for name in ("d1", "d2", "fl", "sf")], [(0, 100)] * 4)
+
     def test_a_plain_street_has_a_sky(self):
         plain = self.new_folder() / "plain"
         self.assert_works("synth", "--out", plain, "--plain", "--frames", 1, "--width", 160, "--height", 64, "--quiet")

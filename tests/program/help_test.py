@@ -9,7 +9,7 @@ import sys
 
 from program_case import HAS_PACKAGE, PROGRAM, SOURCE, ProgramTest, egosgm
 
-COMMANDS = ("run", "eval", "devices", "compile", "synth", "odometry", "eval-video", "eval-poses", "tune", "report", "doctor", "rectify", "calibrate")
+COMMANDS = ("run", "eval", "devices", "compile", "synth", "odometry", "eval-video", "eval-flow", "eval-poses", "tune", "report", "doctor", "rectify", "calibrate")
 
 
 class Help(ProgramTest):
@@ -23,7 +23,7 @@ class Help(ProgramTest):
             text = self.assert_works(command, "--help")
             self.assertNotRegex(text, r"\(\d+x\)|\[\w+\.\.\.\]|\[\[")
         self.assertIn("egosgm eval [OPTIONS] [ESTIMATE] [TRUTH]\n", self.assert_works("eval", "--help"))
-        for command in ("eval-video", "eval-poses"):
+        for command in ("eval-video", "eval-flow", "eval-poses"):
             self.assertIn(f"egosgm {command} [OPTIONS] [ESTIMATE] [TRUTH]\n", self.assert_works(command, "--help"))
 
     def test_the_page_names_every_subcommand_and_exit_code(self):

@@ -82,7 +82,7 @@ class Started(subprocess.Popen):
 
 def needs_package(test, arguments):
     """Skips a test of a command that the Python package has, where the build is without it."""
-    if arguments and arguments[0] in ("eval-video", "eval-poses") and not TOOLS:
+    if arguments and arguments[0] in ("eval-video", "eval-flow", "eval-poses") and not TOOLS:
         test.skipTest(f"no Python package beside the program, which has {arguments[0]}")
 
 

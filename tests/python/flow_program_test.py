@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""egosgm eval-flow against numbers that are counted by hand."""
+import json
+import math
+import struct
+
+import numpy as np
+import pytest
+
+import egosgm
+from egosgm.flow_program import _work, count_outliers
+
+NO = math.nan
+
+
+def row(*values):
+    return np.array(values, np.float32).reshape(1, len(values), -1)
+
+
+def counts(estimates, truths, moving=None):
+    return {region: rows.tolist() for region, rows in count_outliers(estimates, truths, moving).items()}
+
+
+def test_an_outlier_is_off_by_more_than_3_px_and_5_percent():
+    disparity = row(10, 13, 13.25, 104, 105.25, 106, NO, 50), row(10, 10, 10, 100, 100, 100, 10, NO)
+    next_disparity = row(20, NO, *[20] * 6), row(*[20] * 7, NO)
+    flow = row(*[(0, 0)] * 6, (NO, NO), (3, 4)), row((3, 0), (0, 3.25), (2.25, 2.25), *[(0, 0)] * 4, (NO, NO))
+    found = counts(*zip(disparity, next_disparity, flow), np.array([[0, 0, 1, 1, 0, 0, 0, 0]], bool))
+    assert found["all"] == [[4, 7, 6], [1, 7, 6], [3, 7, 6], [5, 7, 5]]  # outliers, with truth, with both
+    assert found["moving"] == [[1, 2, 2], [0, 2, 2], [1, 2, 2], [1, 2, 2]]
+    assert found["static"] == [[3, 5, 4], [1, 5, 4], [2, 5, 4], [4, 5, 3]]
+
+
+def test_each_measure_has_its_own_truth_and_all_of_them_that_of_sf():
+    truths = row(10, NO, 10), row(10, 10, NO), row((0, 0), (0, 0), (0, 0))
+    assert counts([row(*[NO] * 3), row(*[NO] * 3), row(*[(9, 0)] * 3)], truths) == {"all": [[2, 2, 0], [2, 2, 0], [3, 3, 3], [1, 1, 0]]}
+
+
+def test_a_hole_is_right_where_nothing_is():
+    sky, flow = row(1 / 256, 1 / 256), row((0, 0), (0, 0))
+    assert counts([row(NO, 4), row(NO, 1), flow], [sky, sky, flow])["all"] == [[1, 2, 1], [0, 2, 1], [0, 2, 2], [1, 2, 1]]
+
+
+def write(folder, disparity, next_disparity, flow):
+    for name, value in (("disp_0", disparity), ("disp_1", next_disparity)):
+        (folder / name).mkdir(parents=True, exist_ok=True)
+        np.save(folder / name / "000003.npy", np.asarray(value, np.float32))
+    (folder / "flow").mkdir(exist_ok=True)
+    height, width = np.shape(flow)[:2]
+    (folder / "flow/000003.flo").write_bytes(b"PIEH" + struct.pack("<ii", width, height) + np.asarray(flow, np.float32).tobytes())
+    return folder
+
+
+def test_folders_are_compared_frame_by_frame(tmp_path):
+    truth = write(tmp_path / "truth", [[10, 10, 20, 0]], [[10, 10, 20, 20]], [[[1, 0]] * 4])
+    estimate = write(tmp_path / "estimate", [[10, 14, 0, 5]], [[10, 10, 20, 20]], [[[5, 0]] + [[1, 0]] * 3])
+    result = json.loads(_work([str(estimate), str(truth), "--json"]))
+    figures = {name: (figure["outliers_percent"], figure["density_percent"], figure["truth_pixels"]) for name, figure in result["regions"]["all"].items()}
+    assert figures == {"d1": (pytest.approx(200 / 3), pytest.approx(200 / 3), 3), "d2": (0, 100, 4), "fl": (25, 100, 4), "sf": (100, pytest.approx(200 / 3), 3)}
+    assert (result["frames"], list(result["regions"]), result["over_frames"][0]["name"]) == (1, ["all"], "000003")
+    text = _work(["--estimate", str(estimate), "--truth", str(tmp_path)])  # a sequence's folder
+    assert "1 frame\n" in text and "SF" in text and text.splitlines()[2].split()[:3] == ["all", "66.67", "%"]
+
+
+def test_what_cannot_be_compared_is_named(tmp_path):
+    truth = write(tmp_path / "truth", [[1, 2]], [[1, 2]], [[[0, 0]] * 2])
+    small = write(tmp_path / "small", [[1, 2]], [[1, 2]], [[[0, 0]]])
+    with pytest.raises(egosgm.InvalidArgument, match="000003.flo.*1x1, 2x1"):
+        _work([str(small), str(truth)])
+    (small / "disp_1/000003.npy").rename(small / "disp_1/000004.npy")
+    with pytest.raises(egosgm.InvalidArgument, match="disp_1"):
+        _work([str(small), str(truth)])
+    (small / "disp_1/000004.npy").unlink()
+    (small / "disp_1").rmdir()
+    with pytest.raises(egosgm.InvalidArgument, match="small: has no folder disp_1 or disp_occ_1"):
+        _work([str(small), str(truth)])
