@@ -132,11 +132,12 @@ TEST(Synthetic, MovingMaskIsEmptyWithoutTheOption) {
 TEST(Synthetic, SceneFlowLeadsToTheNextFrameAndSaysWhatIsSeenThere) {
   SyntheticOptions options = small_options();
   options.turn_deg = 2.7, options.noise_grey = 0;
+  options.moving_object_scale = 5;  // so wide that its turn of 1.9 degrees shows
   for (const bool plain : {false, true}) {
     options.plain = plain, options.moving_object = true;
     const SyntheticSequence sequence(options);
-    const SyntheticFrame frame = sequence.render(7), next = sequence.render(8);
-    const SyntheticSceneFlow flow = sequence.scene_flow(7), then = sequence.scene_flow(8);
+    const SyntheticFrame frame = sequence.render(3), next = sequence.render(4);
+    const SyntheticSceneFlow flow = sequence.scene_flow(3), then = sequence.scene_flow(4);
     int counts[2] = {}, agree[2] = {}, hidden = 0, behind = 0, same = 0;
     double grey_difference = 0;
     for (int y = 0; y < frame.left.rows; ++y) {
@@ -160,7 +161,7 @@ TEST(Synthetic, SceneFlowLeadsToTheNextFrameAndSaysWhatIsSeenThere) {
       }
     }
     const int all = counts[0] + counts[1];
-    EXPECT_GT(counts[0], 20000) << "plain " << plain;
+    EXPECT_GT(counts[0], 15000) << "plain " << plain;
     EXPECT_GT(counts[1], plain ? 50 : 500) << "plain " << plain;
     for (const int moves : {0, 1}) EXPECT_GT(agree[moves], 0.98 * counts[moves]) << "plain " << plain << moves;
     EXPECT_GT(behind, 0.95 * hidden) << "plain " << plain;
