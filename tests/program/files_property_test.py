@@ -29,7 +29,7 @@ class Tree:
         for side in ("left", "right", "disparity", "variance"):
             (user / side).mkdir(parents=True)
             for i in range(3):
-                (user / side / f"{i:06d}.png").write_bytes(grey_png(32, 16))
+                (user / side / f"{i:06d}.png").write_bytes(grey_png(32, 16, frame=i))
         (user / "calib.toml").write_text("fx = 100\nfy = 100\ncx = 16\ncy = 8\nbaseline_m = 0.5\n")
         (user / "poses.txt").write_text(POSES * 3)
         (user / "config.toml").write_text("# Options of egosgm run: read back with --config.\ndisparities = 16\n")

@@ -34,7 +34,7 @@ class FilesTest(ProgramTest):
         for side in ("left", "right"):
             (folder / side).mkdir(parents=True)
             for i in range(2):
-                (folder / side / f"{i:06d}.png").write_bytes(grey_png(64, 32))
+                (folder / side / f"{i:06d}.png").write_bytes(grey_png(64, 32, frame=i))
         (folder / "calib.toml").write_text(CALIBRATION)
         (folder / "poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n" * 2)
         (folder / "config.toml").write_text("disparities = 16\n")

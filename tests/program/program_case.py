@@ -96,9 +96,9 @@ def png(width, height, depth, rows, palette=b""):
     return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + (chunk(b"PLTE", palette) if palette else b"") + chunk(b"IDAT", body) + chunk(b"IEND", b"")
 
 
-def grey_png(width, height, depth=8):
-    """A textured PNG, built here so that sizes and depths are free."""
-    return png(width, height, depth, (bytes((x * 7 + y * 13 + x * y) % 256 for x in range(width * depth // 8)) for y in range(height)))
+def grey_png(width, height, depth=8, frame=0):
+    """A textured PNG, built here so that sizes and depths are free; frames differ."""
+    return png(width, height, depth, (bytes((x * 7 + y * 13 + x * y + frame) % 256 for x in range(width * depth // 8)) for y in range(height)))
 
 
 class ProgramTest(unittest.TestCase):
