@@ -6,6 +6,7 @@ list(APPEND CMAKE_CXX_IMPLICIT_INCLUDE_DIRECTORIES /usr/include)
 set(fmt_DIR /usr/lib/${CMAKE_HOST_SYSTEM_PROCESSOR}-linux-gnu/cmake/fmt)
 add_compile_options(-isystem ${EGOSGM_WHEEL_PREFIX}/include -idirafter /usr/include -ffunction-sections -fdata-sections)
 add_link_options(LINKER:--gc-sections)
+set(CMAKE_BUILD_WITH_INSTALL_RPATH ON)  # a path of this machine may have a comma, at which the compiler would part it
 set(CMAKE_CXX_STANDARD_LIBRARIES "-ldl -lpthread")
 
 foreach(library ZLIB:libz.a PNG:libpng16.a JPEG:libjpeg.a ISAL:libisal.so OpenCL:libOpenCL.so.1)
