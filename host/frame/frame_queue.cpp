@@ -5,6 +5,7 @@
 
 #include "host/frame/check_frame.h"
 #include "host/grey_levels.h"
+#include "host/pair_hash.h"
 #include "host/tuning_defaults.h"
 
 namespace egosgm {
@@ -12,19 +13,6 @@ namespace {
 
 /// The images that show the driver all kernels are this wide, and as high as others, for every launch.
 constexpr int kRehearsedWidth = 16;
-
-/// Writes the pixels of both views without gaps. Allocates only for the first images of a type.
-void pack(const ImageView& left, const ImageView& right, std::vector<cl_uchar>& pixels) {
-  const std::size_t bytes = left.type == PixelType::kU8 ? 1 : 2;
-  pixels.clear();
-  pixels.reserve(2 * bytes * left.width * left.height);
-  for (const ImageView* view : {&left, &right}) {
-    for (int y = 0; y < view->height; ++y) {
-      const auto* row = static_cast<const cl_uchar*>(view->data) + y * view->stride_bytes;
-      pixels.insert(pixels.end(), row, row + bytes * view->width);
-    }
-  }
-}
 
 /// `motion` from the last frame, as one from the images of the belief.
 std::optional<Motion> since_images(const Belief& belief, const std::optional<Motion>& motion) {
@@ -94,8 +82,8 @@ void FrameQueue::submit(const ImageView& left, const ImageView& right, const std
   FrameUnderWay frame{&free_transfer(), belief_, free_memory(), {}, {}, Clock::now()};
   ocl::Drain drain{context_};
   release_results();
-  if (method_options_.temporal) pack(left, right, *frame.after.images);
-  const bool repeats = motion && !belief_.why_not && !belief_.images->empty() && *belief_.images == *frame.after.images;
+  frame.after.images = method_options_.temporal ? std::optional(hash_of(left, right)) : std::nullopt;
+  const bool repeats = motion && !belief_.why_not && belief_.images && belief_.images == frame.after.images;
   const std::optional<Motion> moved = since_images(belief_, motion);
   frame.after.since = repeats ? *moved : Motion();
   Plan plan =
@@ -138,7 +126,7 @@ DeviceMaps FrameQueue::enqueue(const FrameImages& images, const std::optional<Mo
   release_results();
   const Plan plan =
       plan_of(method_options_, belief_.why_not, belief_.offset.is_known, since_images(belief_, motion), wanted);
-  after.images->clear();
+  after.images.reset();
   after.since = Motion();
   const StereoMaps result = method_.frame(plan, images, belief_, after, transfer.given_out()).given_out;
   const cl::Event end = done ? context_.end_of_recorded() : cl::Event();

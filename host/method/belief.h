@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <memory>
 #include <optional>
-#include <vector>
 
 #include "egosgm/pipeline.h"
+#include "host/pair_hash.h"
 #include "host/stages/dynamic_map.h"
 #include "host/stages/maps.h"
 #include "host/stages/vertical_alignment.h"
@@ -17,10 +16,10 @@ struct Belief {
   StereoMaps maps;
   FlagMap evidence;  // of each pixel (kernels/method.h); what has enough of it is given out
   VerticalOffset offset;
-  ocl::Buffer<cl_ushort> halved;                  // the left image at half of the resolution (DynamicMap)
-  bool has_halved = false;                        // the frame's `dynamic` was wanted
-  std::shared_ptr<std::vector<cl_uchar>> images;  // that it is of, both views; empty where the host does not know them
-  Motion since;  // of the camera, since its images: where they repeat, no motion counts yet
+  ocl::Buffer<cl_ushort> halved;   // the left image at half of the resolution (DynamicMap)
+  bool has_halved = false;         // the frame's `dynamic` was wanted
+  std::optional<PairHash> images;  // that it is of; none where the host does not know them
+  Motion since;                    // of the camera, since its images: where they repeat, no motion counts yet
   std::optional<Unpredicted> why_not = Unpredicted::kFirstFrame;  // there are no maps
 
   /// Starts empty.
@@ -28,8 +27,7 @@ struct Belief {
       : maps(context, size),
         evidence(context, 2 * pixel_count(size)),
         offset(context),
-        halved(context, pixel_count(DynamicMap::half(size))),
-        images(std::make_shared<std::vector<cl_uchar>>()) {}
+        halved(context, pixel_count(DynamicMap::half(size))) {}
 
   /// Forgets all.
   void forget(Unpredicted why) {
