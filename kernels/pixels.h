@@ -136,6 +136,14 @@ static inline Floats load_pixels_of(const float* values) {
 #endif
 }
 
+static inline Ints load_ints_of(const int* values) {
+#if PIXELS == 1
+  return values[0];
+#else
+  return vload16(0, values);
+#endif
+}
+
 typedef struct __attribute__((packed)) {
   Floats lanes;
 } PackedFloats;

@@ -97,7 +97,7 @@ ALWAYS_INLINE void match_wide(const bool meets, const SgmParameters q, const Row
   pixel.first = row->bands[place->k].first - origin;
   pixel.last = row->bands[place->k].last - origin;
   pixel.seen = row->seen ? row->seen + place->k - origin : 0;
-  match_blocks(meets, chunks_of(extent) / 2, &pixel, place->candidate);
+  match_blocks(meets, chunks_of(extent) / 2, &pixel, &row->windows[place->k], &row->winners[place->k]);
 }
 
 // Matches the next pixel that does not go straight, and goes on to the one after it.
@@ -116,7 +116,7 @@ ALWAYS_INLINE void match_pixel(const bool meets, const bool backward, const SgmP
   if (!backward) place->cells += EGOSGM_LANES * chunks_of(extent);
   place->wiped[0] = extent;
   place->moved += SLOT;
-  go_on(meets, row, place);
+  go_on(row, place);
 }
 
 ALWAYS_INLINE void sweep_row(const bool meets, const bool backward, const SgmParameters q, const Row* row,
@@ -181,7 +181,7 @@ ALWAYS_INLINE Row row_at(const bool meets, const bool backward, const SgmParamet
 
 // The first pixel of a row.
 ALWAYS_INLINE Place place_in(const bool backward, const SgmParameters q, const Sweep* sweep, const Row* row,
-                             const int y, const int from, const int to, Candidate* candidates) {
+                             const int y, const int from, const int to) {
   const int width = q.width, height = q.height;
   const int image_y = (backward ? sweep->rows - 1 - y : y) * sweep->row_step;
   const int image_x = backward ? width - 1 - from : from;
@@ -201,7 +201,6 @@ ALWAYS_INLINE Place place_in(const bool backward, const SgmParameters q, const S
   place.cells = sweep->sums + ((row_start + width) * MAX_CHUNKS + first_cell) * EGOSGM_LANES;
   place.own = codes + ((size_t)image * height + image_y) * code_stride + along;
   place.other = codes + ((size_t)(1 - image) * height + image_y) * code_stride + (width - 1 - along);
-  place.candidate = candidates;
   place.around.before = row->penalties[left];
   place.around.above_before = row->penalties[above + left];
   place.around.above = row->penalties[above];
@@ -226,34 +225,44 @@ ALWAYS_INLINE Place place_in(const bool backward, const SgmParameters q, const S
 
 // Leaves the winners of `count` pixels of a row, from the first one in the image on: disparity with its sub-pixel part,
 // by a symmetric V through the winner and its neighbours, and the matching variance (options.h).
-COMPILED_ONCE void leave_winners(const bool backward, const SgmParameters q, const Candidate* candidates,
-                                 const int count, global float* disparities, global float* variances) {
-  ulong winners[TILE_WIDTH + PIXELS];
-  for (int i = 0; i < count; ++i) winners[backward ? count - 1 - i : i] = winner_of(q, &candidates[i]);
+COMPILED_ONCE void leave_winners(const SgmParameters q, const Window* windows, const int* winners, const int count,
+                                 global float* disparities, global float* variances) {
   for (int x = 0; x < count; x += PIXELS) {
-    const Winners winner = load_winners(winners + x);
-    const Ints rise_before = FIELD(winner, 16), rise_after = FIELD(winner, 32);
-    const Ints steps = FIELD(winner, 48);
-    store_pixels(refined(FIELD(winner, 0), rise_before, rise_after), disparities, x, count);
-    store_pixels(matching_variance(q, steps), variances, x, count);
+    TotalOfEach before[MAX_STEPS], after[MAX_STEPS];
+    totals_beside(windows + x, winners + x, -MAX_STEPS, before);
+    totals_beside(windows + x, winners + x, 1, after);
+    const Ints winner = load_ints_of(winners + x), total = (winner & 0xffff) >> 4;
+    const TotalOfEach here = TOTALS_OF_INTS(total);
+    const TotalOfEach steps =
+        steps_along(before + MAX_STEPS - 1, -1, here, (ushort)q.s_max) + steps_along(after, 1, here, (ushort)q.s_max);
+    const Ints sum_before = INTS_OF_TOTALS(before[MAX_STEPS - 1]), sum_after = INTS_OF_TOTALS(after[0]);
+    const Ints fits = (sum_before != 65535) & (sum_after != 65535);
+    const Floats refined_winner =
+        refined(winner >> 16, fits ? sum_before - total : (Ints)(0), fits ? sum_after - total : (Ints)(0));
+    store_pixels(refined_winner, disparities, x, count);
+    store_pixels(matching_variance(q, INTS_OF_TOTALS(steps)), variances, x, count);
   }
 }
 
 // Both flags are constants wherever it is called: each direction has code of its own, whose steps need no registers.
 ALWAYS_INLINE void sweep_tile(const bool meets, const bool backward, const SgmParameters q, const Sweep* sweep,
                               const int tile_x, const int first_y, const int end_y) {
-  Candidate candidates[TILE_WIDTH];
+  Window windows[TILE_WIDTH + PIXELS];
+  int winners[TILE_WIDTH + PIXELS];
   for (int y = first_y; y < end_y; ++y) {
     const int skew = y - first_y;
     const int from = max(0, tile_x * TILE_WIDTH - skew), to = min(q.width, (tile_x + 1) * TILE_WIDTH - skew);
     if (from >= to) continue;
-    const Row row = row_at(meets, backward, q, sweep, y, from, to);
-    Place place = place_in(backward, q, sweep, &row, y, from, to, candidates);
+    Row row = row_at(meets, backward, q, sweep, y, from, to);
+    const int last = to - from - 1, first = backward ? last : 0;
+    row.windows = windows + first;
+    row.winners = winners + first;
+    Place place = place_in(backward, q, sweep, &row, y, from, to);
     sweep_row(meets, backward, q, &row, &place);
     // Apart from the sweep, whose pixels wait for each other: these do not.
     if (meets) {
-      const size_t at = row.bands - sweep->bands - (backward ? to - from - 1 : 0);
-      leave_winners(backward, q, candidates, to - from, sweep->disparities + at, sweep->variances + at);
+      const size_t at = row.bands - sweep->bands - first;
+      leave_winners(q, windows, winners, to - from, sweep->disparities + at, sweep->variances + at);
     }
   }
 }

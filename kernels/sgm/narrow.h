@@ -58,16 +58,15 @@ ALWAYS_INLINE void match_narrow(const bool meets, const SgmParameters q, const R
   follow_narrow(q, row, extent, steps, absent, cost, place, r);
   const uchar16 sum = half_sum(r);
   if (meets) {
-    Candidate* candidate = place->candidate;
     const ushort16 total = (convert_ushort16(sum) + convert_ushort16(load(place->cells))) | widened(absent);
     const int first = row->bands[place->k].first - origin, last_of_band = row->bands[place->k].last - origin;
-    candidate->totals = (ulong8)(~0ul, ~0ul, as_ulong4(total), ~0ul, ~0ul);
+    row->windows[place->k] = (Window)(~0ul, ~0ul, as_ulong4(total), ~0ul, ~0ul);
     const ushort16 allowed = total | barred(first, last_of_band);
-    candidate->rank = ranked(allowed);
+    const int rank = ranked(allowed);
     if (row->seen) {
-      offer(allowed, candidate->rank >> 4, cost, q.disparities - 1 - lane, row->seen + place->k - origin);
+      offer(allowed, rank >> 4, cost, q.disparities - 1 - lane, row->seen + place->k - origin);
     }
-    candidate->disparity = origin + (candidate->rank & 15);
+    row->winners[place->k] = winner_at(origin + (rank & 15), rank);
   } else if (is_chunk(extent)) {
     store_chunk(sum.lo, place->cells);
   } else {

@@ -61,8 +61,8 @@ ALWAYS_INLINE void find_winner_of_block(const SgmParameters q, const Row* row, c
   store_totals(totals[0], all + MAX_STEPS);
   store_totals(totals[1], all + MAX_STEPS + VECTOR);
   store_end(all + MAX_STEPS + BLOCK);
-  put_window(all + MAX_STEPS + best_lane, winner_total, place->candidate);
-  place->candidate->disparity = origin + best_lane;
+  put_window(all + MAX_STEPS + best_lane, &row->windows[place->k]);
+  row->winners[place->k] = winner_at(origin + best_lane, winner_total << 4);
   if (!row->seen) return;
   global uint* seen = row->seen + place->k - origin;
   offer(allowed[0], winner_total, FIRST_VECTOR(cost), q.disparities - 1 - lane, seen);

@@ -15,6 +15,8 @@ typedef struct {
   // Slots of the paths from the left, from above, from the upper left and from the upper right; the latter three move
   // on with x.
   global uchar* slot[4];
+  Window* windows;            // of the first pixel, in the image's order
+  int* winners;               // (winner_at)
   global uint* seen;          // the rank of the right pixel at the row's first one; null: none are kept
   long row_above, row_below;  // to the codes of these rows
   long above_right;           // to that pixel
@@ -28,7 +30,6 @@ typedef struct {
   long k;
   global uchar* cells;             // its sums, or in a backward sweep their end
   global const Code *own, *other;  // its code, and that of disparity 0 in the other view
-  Candidate* candidate;
   Penalties around;
   uint wiped[4];  // the extents of those before it on the four paths
   uchar16 last;   // the path costs of the one to the left, where its band is narrow
@@ -39,8 +40,7 @@ typedef struct {
 } Place;
 
 // Goes on to the next pixel, but for its sums and `moved`. What was to the upper right is above it.
-ALWAYS_INLINE void go_on(const bool meets, const Row* row, Place* place) {
-  if (meets) ++place->candidate;
+ALWAYS_INLINE void go_on(const Row* row, Place* place) {
   place->wiped[2] = place->wiped[1];
   place->wiped[1] = place->wiped[3];
   place->own += row->code_step;

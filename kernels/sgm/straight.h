@@ -150,18 +150,16 @@ ALWAYS_INLINE void leave_chunk(const bool meets, const SgmParameters q, const Ro
     store_chunk(sum, place->cells);
     return;
   }
-  Candidate* candidate = place->candidate;
   const ushort8 total = convert_ushort8(sum) + convert_ushort8(load_chunk(place->cells));
   const int first = row->bands[place->k].first - origin, last_of_band = row->bands[place->k].last - origin;
-  candidate->totals = (ulong8)(~0ul, ~0ul, as_ulong2(total), ~0ul, ~0ul, ~0ul, ~0ul);
+  row->windows[place->k] = (Window)(~0ul, ~0ul, as_ulong2(total), ~0ul, ~0ul, ~0ul, ~0ul);
   const ushort8 allowed = total | barred_of_chunk(first, last_of_band);
   const int rank = ranked_in_chunk(allowed);
   if (seen->at) {
     seen->ranks =
         min(seen->ranks, offered_by_chunk(allowed, rank >> 4, cost, q.disparities - 1 - (origin - q.min_disparity)));
   }
-  candidate->rank = rank;
-  candidate->disparity = origin + (rank & 15);
+  row->winners[place->k] = winner_at(origin + (rank & 15), rank);
 }
 
 static inline Seen seen_of(const Row* row, const Place* place, const int origin) {
@@ -190,7 +188,7 @@ ALWAYS_INLINE void match_straight(const bool meets, const bool backward, const S
     const uchar8 cost = matching_cost_of_chunk(place->own, place->other + origin, row->row_above, row->row_below);
     const uchar8 sum = follow_chunk(cost, steps, row->p1, &to, along, before, &left);
     leave_chunk(meets, q, row, place, origin, cost, sum, &seen);
-    go_on(meets, row, place);
+    go_on(row, place);
     place->wiped[0] = extent;
     if (!backward) place->cells += EGOSGM_LANES;
     along += SLOT;

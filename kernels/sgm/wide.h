@@ -88,14 +88,14 @@ static inline void leave_block(const bool meets, const bool is_tail, const Pixel
 
 // The winner and its neighbourhood; and offers the pixel to the right ones.
 static inline void find_winner(const Pixel* pixel, const int vectors, const PathCosts* costs, ushort* totals,
-                               const Best* best, Candidate* candidate) {
+                               const Best* best, Window* window, int* winner) {
   store_end(totals - MAX_STEPS);
   store_end(totals + VECTOR * vectors);
   const ushort winner_total = minimum_of_totals(best->total);
   const ushort16 lanes = best->vector * (ushort16)(VECTOR) + convert_ushort16(kLane);
   const int best_lane = minimum_of_totals(lanes | as_ushort16(best->total != (ushort16)(winner_total)));
-  put_window(totals + best_lane, winner_total, candidate);
-  candidate->disparity = pixel->origin + best_lane;
+  put_window(totals + best_lane, window);
+  *winner = winner_at(pixel->origin + best_lane, winner_total << 4);
   for (int v = 0; pixel->seen && v < vectors; ++v) {
     const int at = VECTOR * v;
     const ushort16 allowed = ((const Totals*)(totals + at))->totals | barred(pixel->first - at, pixel->last - at);
@@ -103,7 +103,7 @@ static inline void find_winner(const Pixel* pixel, const int vectors, const Path
   }
 }
 
-ALWAYS_INLINE void match_blocks(const bool meets, const int vectors, const Pixel* pixel, Candidate* candidate) {
+ALWAYS_INLINE void match_blocks(const bool meets, const int vectors, const Pixel* pixel, Window* window, int* winner) {
   const int blocks = vectors / BLOCK_VECTORS;
   const bool has_tail = vectors % BLOCK_VECTORS != 0;
   const Block tail = block_from(VECTOR) | absent_in_block(pixel->disparities - BLOCK * blocks);
@@ -132,7 +132,7 @@ ALWAYS_INLINE void match_blocks(const bool meets, const int vectors, const Pixel
     leave_block(meets, false, pixel, b, absent, &costs, least, totals + MAX_STEPS, &best);
   }
   if (has_tail) leave_block(meets, true, pixel, blocks, tail, &costs, least, totals + MAX_STEPS, &best);
-  if (meets) find_winner(pixel, vectors, &costs, totals + MAX_STEPS, &best, candidate);
+  if (meets) find_winner(pixel, vectors, &costs, totals + MAX_STEPS, &best, window, winner);
 }
 
 #endif

@@ -13,48 +13,17 @@ typedef struct __attribute__((packed)) {
   uint8 ranks;
 } ChunkRanks;
 
-// Both together: steps to the left and to the right of the winner until the sums above its own add up to `limit`.
-// `beside` holds the sums of the eight lanes before the winner, the nearest first, and of the eight after it.
-static inline uint count_steps(const ushort16 beside, const ushort winner, const ushort limit) {
-  const ushort16 from_1 = (ushort16)(0, -1, -1, -1, -1, -1, -1, -1, 0, -1, -1, -1, -1, -1, -1, -1);
-  const ushort16 from_2 = (ushort16)(0, 0, -1, -1, -1, -1, -1, -1, 0, 0, -1, -1, -1, -1, -1, -1);
-  const ushort16 from_4 = (ushort16)(0, 0, 0, 0, -1, -1, -1, -1, 0, 0, 0, 0, -1, -1, -1, -1);
-  ushort16 total = sub_sat(beside, (ushort16)(winner));
-  total = add_sat(total, total.s00123456889abcde & from_1);
-  total = add_sat(total, total.s000123458889abcd & from_2);
-  total = add_sat(total, total.s00000123888889ab & from_4);
-  const ulong2 counted = as_ulong2(convert_uchar16(as_ushort16(total < (ushort16)(limit))) & (uchar16)(1));
-  return (uint)((counted.x + counted.y) * 0x0101010101010101ul >> 56);
-}
+// A winner before its neighbourhood is looked at: the sums of 16 lanes between MAX_STEPS of 65535 on both sides.
+typedef ulong8 Window;
 
-// A winner before its neighbourhood is looked at: the sums of 16 lanes between MAX_STEPS of 65535 on both sides, the
-// winner's total and lane (see `ranked`), and its disparity.
-typedef struct {
-  ulong8 totals;
-  int rank;
-  int disparity;
-} Candidate;
+// Its place in one word: the disparity in the upper half, in the lower one the total and the lane (see `ranked`).
+static inline int winner_at(const int disparity, const int rank) { return disparity << 16 | rank; }
 
-// A winner with its neighbourhood in lane 0. `totals`: at the winner's, of MAX_STEPS on both sides.
-static inline void put_window(const ushort* totals, const int winner_total, Candidate* candidate) {
-  ushort* window = (ushort*)&candidate->totals;
-  store_totals(((const Totals*)(totals - MAX_STEPS))->totals, window);
-  window[2 * MAX_STEPS] = totals[MAX_STEPS];
-  candidate->rank = winner_total << 4;
-}
-
-// Inputs of `leave_winners` for a pixel: disparity, path sums of the two neighbours above the winner's (0 both if one
-// is missing), steps; 16 bits each.
-static inline ulong winner_of(const SgmParameters q, const Candidate* candidate) {
-  const int here = candidate->rank >> 4;
-  const ushort* at = (const ushort*)&candidate->totals + MAX_STEPS + (candidate->rank & 15);
-  const int before = at[-1], after = at[1];
-  const ushort16 beside = (ushort16)(load_totals(at - MAX_STEPS).s76543210, load_totals(at + 1));
-  const uint steps = count_steps(beside, (ushort)here, (ushort)q.s_max);
-  const bool fits = before != 65535 && after != 65535;
-  const ushort rise_before = fits ? (ushort)(before - here) : (ushort)0,
-               rise_after = fits ? (ushort)(after - here) : (ushort)0;
-  return (ulong)(ushort)candidate->disparity | (ulong)rise_before << 16 | (ulong)rise_after << 32 | (ulong)steps << 48;
+// A window with the winner in lane 0. `totals`: at the winner's, of MAX_STEPS on both sides.
+static inline void put_window(const ushort* totals, Window* window) {
+  ushort* to = (ushort*)window;
+  store_totals(((const Totals*)(totals - MAX_STEPS))->totals, to);
+  to[2 * MAX_STEPS] = totals[MAX_STEPS];
 }
 
 // 65535 in the lanes outside of [first, last]: the others are no more than last - first above first.
@@ -93,21 +62,57 @@ static inline uint8 offered_by_chunk(const ushort8 totals, const int least, cons
 static inline uint8 load_ranks(global const uint* from) { return ((global const ChunkRanks*)from)->ranks; }
 static inline void store_ranks(const uint8 ranks, global uint* to) { ((global ChunkRanks*)to)->ranks = ranks; }
 
-// Winners of PIXELS pixels, and a field of each.
+// A total of each of PIXELS pixels.
 #if PIXELS == 1
-typedef ulong Winners;
-#define FIELD(winners, bit) ((int)((long)((winners) << (48 - (bit))) >> 48))
+typedef ushort TotalOfEach;
+#define TOTALS_OF_INTS convert_ushort
+#define INTS_OF_TOTALS convert_int
 #else
-typedef ulong16 Winners;
-#define FIELD(winners, bit) convert_int16(as_long16((winners) << (48 - (bit))) >> 48)
+typedef ushort16 TotalOfEach;
+#define TOTALS_OF_INTS convert_ushort16
+#define INTS_OF_TOTALS convert_int16
+#define MERGED_LOW(a, b)                                                                                             \
+  (ushort16)((a).s0, (b).s0, (a).s1, (b).s1, (a).s2, (b).s2, (a).s3, (b).s3, (a).s8, (b).s8, (a).s9, (b).s9, (a).sa, \
+             (b).sa, (a).sb, (b).sb)
+#define MERGED_HIGH(a, b)                                                                                            \
+  (ushort16)((a).s4, (b).s4, (a).s5, (b).s5, (a).s6, (b).s6, (a).s7, (b).s7, (a).sc, (b).sc, (a).sd, (b).sd, (a).se, \
+             (b).se, (a).sf, (b).sf)
 #endif
 
-static inline Winners load_winners(const ulong* from) {
+// Totals at MAX_STEPS lanes of PIXELS pixels, from `first` lanes beside the winners on: a vector has one lane of all.
+static inline void totals_beside(const Window* windows, const int* winners, const int first, TotalOfEach* lanes) {
+#define BESIDE(i) (const ushort*)(windows + (i)) + (MAX_STEPS + (winners[i] & 15) + first)
 #if PIXELS == 1
-  return from[0];
+  for (int i = 0; i < MAX_STEPS; ++i) lanes[i] = (BESIDE(0))[i];
 #else
-  return vload16(0, from);
+#pragma unroll
+  for (int i = 0; i < MAX_STEPS; ++i) {
+    lanes[i] = (ushort16)(load_totals(BESIDE(i)), load_totals(BESIDE(i + MAX_STEPS)));
+  }
+  // Eight rows of eight become columns, in both halves: a round merges the first four with the others, lane by lane.
+#pragma unroll
+  for (int round = 0; round < 3; ++round) {
+    const TotalOfEach from[MAX_STEPS] = {lanes[0], lanes[1], lanes[2], lanes[3],
+                                         lanes[4], lanes[5], lanes[6], lanes[7]};
+#pragma unroll
+    for (int i = 0; i < MAX_STEPS / 2; ++i) {
+      lanes[2 * i] = MERGED_LOW(from[i], from[i + MAX_STEPS / 2]);
+      lanes[2 * i + 1] = MERGED_HIGH(from[i], from[i + MAX_STEPS / 2]);
+    }
+  }
 #endif
+}
+
+// Steps to one side of the winners until the sums above their own add up to `limit`. `lanes`: from the nearest on.
+static inline TotalOfEach steps_along(const TotalOfEach* lanes, const int step, const TotalOfEach here,
+                                      const ushort limit) {
+  TotalOfEach total = 0, steps = 0;
+#pragma unroll
+  for (int i = 0; i < MAX_STEPS; ++i) {
+    total = add_sat(total, sub_sat(lanes[i * step], here));
+    steps += total < (TotalOfEach)(limit) ? (TotalOfEach)(1) : (TotalOfEach)(0);
+  }
+  return steps;
 }
 
 #endif
