@@ -144,8 +144,6 @@ Arguments parse_arguments(int argc, char** argv, const char* help, int default_r
       arguments.bits = *bits;
     } else if (const auto cases = value_of("--export", argc, argv, i)) {
       arguments.cases = *cases;
-    } else if (const auto sweep = value_of("--sweep", argc, argv, i)) {
-      arguments.sweep = *sweep;
     } else if (const auto setting = value_of("--set", argc, argv, i)) {
       arguments.settings.push_back(*setting);
     } else {

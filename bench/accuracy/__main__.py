@@ -10,7 +10,6 @@
   python3 bench/accuracy --paper      the table of Fucek et al. (IFAC 2017) on all scenes at hand, and its figure of a frame's stages
   python3 bench/accuracy --paper --kitti2015 DIR --scenes 84,87,130,146,148 --frames 0:10
                                       and on scenes of KITTI 2015's multi-view data
-Plots and markdown from the JSON: bench/plot.py.
 """
 import argparse
 import datetime
@@ -98,7 +97,7 @@ def main():
     else:
         table = ego_motion_table(bench, arguments) if arguments.ego_motion else main_table(bench, arguments)
         table.print()
-        content["rows"], content["curves"] = table.rows, table.curves
+        content["rows"] = table.rows
         rows, skipped, code = table.rows, [row["figure"] for row in table.skipped()], table.exit_code()
     if not rows and not skipped:
         sys.exit("accuracy: nothing was measured: --only and --inputs are patterns of titles, see --help")

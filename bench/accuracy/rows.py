@@ -179,9 +179,9 @@ def poles(bench, table):
 
 
 def uncertainty(bench, table):
-    """What the variances are worth; also what plot.py draws."""
+    """What the variances are worth."""
     figures = bench.video_figures()
-    curves, kitti, fields = [], [], []
+    kitti, fields = [], []
 
     def flatness(title, pairs, fields=()):
         chance = figures.flatness_by_chance(pairs)
@@ -214,7 +214,6 @@ def uncertainty(bench, table):
         flatness(title, pairs, fields)
         table.add(title, "error^2 / variance of what is not bad", worth["ratio_not_bad"], "")
         table.add(title, "of the bad, in the worst 10 % by variance", worth["removed"], limit="uncertainty, removed" if limit else None, goal=50)
-        curves.append({"input": title, "bins": worth["bins"]})
     streets = [figures.Street(bench.synthetic_folder(seed=seed)) for seed in (1, 2, 3)]
     add("synthetic, seeds 1, 2, 3", [pair for street in streets for pair in figures.errors_and_variances(street, range(STEADY_FROM, 20))],
         "uncertainty, ratio")
@@ -232,7 +231,6 @@ def uncertainty(bench, table):
         table.add(f"{year} / {scene}", f"the same, variances above {CERTAIN_VARIANCE_PX2} px^2 left out before", certain, goal=every)
     flatness("these three together", kitti, fields)
     table.fill("these three, each alone", lambda: least_flatness(figures, table, kitti, fields))
-    return curves
 
 
 def least_flatness(figures, table, scenes, fields):
@@ -280,7 +278,7 @@ def main_table(bench, arguments):
         table.fill("flicker", lambda: flicker(bench, table))
         table.fill("wrong motion", lambda: recovery(bench, table))
         table.fill("500 frames", lambda: long_run(bench, table))
-        table.fill("uncertainty", lambda: table.curves.update(uncertainty=uncertainty(bench, table)))
+        table.fill("uncertainty", lambda: uncertainty(bench, table))
     if not arguments.no_speed:
         table.fill("speed", lambda: speed(bench, table, arguments.compare_json))
     return table

@@ -22,7 +22,6 @@ class Table:
     def __init__(self, only=""):
         self.only = only  # a pattern of the inputs that are filled in
         self.rows = []
-        self.curves = {}  # beside them, for plot.py
 
     def add(self, source, figure, value, unit="%", limit=None, single=None, **limits):
         """`limit`: a name in limits.json; `limits`: the same, for what hangs on other figures. at_most and at_least are kept or missed; missing `goal`
