@@ -8,8 +8,7 @@
 
 #include "host/stages/matcher.h"
 #include "host/stages/search_band.h"
-#include "tests/support/device.h"
-#include "tests/support/device_maps.h"
+#include "tests/support/stage_case.h"
 
 namespace egosgm {
 namespace {

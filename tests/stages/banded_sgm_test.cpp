@@ -10,10 +10,8 @@
 #include "tests/reference/banded_sgm.h"
 #include "tests/reference/census.h"
 #include "tests/reference/step_penalties.h"
-#include "tests/support/compare.h"
-#include "tests/support/device.h"
-#include "tests/support/device_maps.h"
 #include "tests/support/expect_refused.h"
+#include "tests/support/stage_case.h"
 
 namespace egosgm {
 namespace {
@@ -109,8 +107,7 @@ Match match(const Case& c, int max_memory_mib = 0) {
   SearchBands bands(context, c.size, c.range);
   BandedSgm sgm(context, c.size, c.range, m.options, c.group, c.tile, c.launches);
   const auto padded = reference::padded_codes(c.size, m.codes[0], m.codes[1], padding, c.cost);
-  ocl::Buffer<cl_uint> device_codes(context, padded.size());
-  device_codes.write(context, {padded.begin(), padded.end()});
+  const auto device_codes = testing::on_device<cl_uint>(context, {padded.begin(), padded.end()});
   StereoMaps predicted(context, c.size);
   StereoMaps measured(context, c.size);
   if (c.banded) {
@@ -120,8 +117,7 @@ Match match(const Case& c, int max_memory_mib = 0) {
     SearchBand(context, c.size, c.range, {.min_half_width_px = 1}).narrow(predicted, {}, bands, Views::kBoth);
   }
   const auto steps = reference::step_penalties(c.size, m.grey, 8, m.options);
-  ocl::Buffer<cl_uchar> penalties(context, steps.size());
-  penalties.write(context, {steps.begin(), steps.end()});
+  const auto penalties = testing::on_device<cl_uchar>(context, {steps.begin(), steps.end()});
   const MatchInputs inputs{device_codes, penalties, bands};
   if (c.reads_off) sgm.prepare_reading_off();
   c.reads_off ? sgm.reading_off(inputs, measured) : sgm.match(inputs, measured, Views::kBoth, c.right_row_step);

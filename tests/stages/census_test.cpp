@@ -7,8 +7,7 @@
 #include <random>
 
 #include "tests/reference/census.h"
-#include "tests/support/compare.h"
-#include "tests/support/device.h"
+#include "tests/support/stage_case.h"
 
 namespace egosgm {
 namespace {
@@ -17,13 +16,18 @@ using Case = std::tuple<shared::ImageSize, PixelType, MatchingCost, int>;
 
 std::string name(const ::testing::TestParamInfo<Case>& info) {
   const auto [size, type, cost, pixels] = info.param;
-  return std::to_string(size.width) + "x" + std::to_string(size.height) +
-         (type == PixelType::kU8 ? "_8bit" : "_16bit") +
+  return testing::name_of(size, type) +
          (cost == MatchingCost::kLearned7x7  ? "_learned7x7"
           : cost == MatchingCost::kCensus9x7 ? "_census9x7"
           : cost == MatchingCost::kCensus5x5 ? "_census5x5"
                                              : "_grey") +
          "_by_" + std::to_string(pixels);
+}
+
+ocl::Buffer<cl_uchar> both(ocl::Context& context, const std::vector<std::uint16_t> (&views)[2], PixelType type) {
+  std::vector<std::uint16_t> greys = views[0];
+  greys.insert(greys.end(), views[1].begin(), views[1].end());
+  return testing::images_of(context, greys, type).pixels;
 }
 
 class CensusTest : public ::testing::TestWithParam<Case> {};
@@ -34,20 +38,14 @@ TEST_P(CensusTest, EqualsReference) {
   std::mt19937 random(1);
   std::uniform_int_distribution<int> grey(0, type == PixelType::kU8 ? 255 : 65535);
   std::vector<std::uint16_t> views[2];
-  std::vector<cl_uchar> raw;
   for (auto& view : views) {
-    for (std::size_t i = 0; i < pixel_count(size); ++i) {
-      view.push_back(static_cast<std::uint16_t>(grey(random)));
-      for (int b = 0; b < bytes; ++b) raw.push_back(static_cast<cl_uchar>(view.back() >> (8 * b)));
-    }
+    for (std::size_t i = 0; i < pixel_count(size); ++i) view.push_back(static_cast<std::uint16_t>(grey(random)));
   }
 
   ocl::Context context(testing::any_device());
   Census census(context, size, type, cost, padding, pixels);
-  ocl::Buffer<cl_uchar> images(context, raw.size());
   ocl::Buffer<cl_uint> codes(context, Census::words(cost, size, padding));
-  images.write(context, raw);
-  census.encode(images, codes);
+  census.encode(both(context, views, type), codes);
 
   const auto expected = reference::padded_codes(size, reference::codes(size, views[0], 8 * bytes, cost),
                                                 reference::codes(size, views[1], 8 * bytes, cost), padding, cost);
@@ -60,15 +58,8 @@ TEST_P(CensusTest, EqualsReference) {
 std::vector<cl_uint> codes_of(shared::ImageSize size, const std::vector<std::uint16_t>& greys) {
   ocl::Context context(testing::any_device());
   Census census(context, size, PixelType::kU16, MatchingCost::kLearned7x7, 0);
-  ocl::Buffer<cl_uchar> images(context, 2 * greys.size());
   ocl::Buffer<cl_uint> codes(context, Census::words(MatchingCost::kLearned7x7, size, 0));
-  std::vector<cl_uchar> raw;
-  for (const std::uint16_t grey : greys) {
-    raw.push_back(static_cast<cl_uchar>(grey));
-    raw.push_back(static_cast<cl_uchar>(grey >> 8));
-  }
-  images.write(context, raw);
-  census.encode(images, codes);
+  census.encode(testing::images_of(context, greys, PixelType::kU16).pixels, codes);
   return codes.read(context);
 }
 
@@ -101,7 +92,7 @@ using AlikeCase = std::tuple<shared::ImageSize, int>;
 
 std::string alike_name(const ::testing::TestParamInfo<AlikeCase>& info) {
   const auto [size, pixels] = info.param;
-  return std::to_string(size.width) + "x" + std::to_string(size.height) + "_by_" + std::to_string(pixels);
+  return testing::name_of(size) + "_by_" + std::to_string(pixels);
 }
 
 class AlikeTest : public ::testing::TestWithParam<AlikeCase> {};
@@ -110,23 +101,19 @@ TEST_P(AlikeTest, EqualsReference) {
   const auto [size, pixels] = GetParam();
   std::mt19937 random(3);
   std::vector<std::uint16_t> views[2];
-  std::vector<cl_uchar> raw;
   for (auto& view : views) {
     for (std::size_t i = 0; i < pixel_count(size); ++i) {  // a wall, noise, and all that 16 bits can be
       const unsigned x = i % size.width, kind = x * 3 / size.width;
       view.push_back(static_cast<std::uint16_t>(kind == 0   ? 30000 + random() % 300
                                                 : kind == 1 ? random() % 2 * 65535
                                                             : random() % 65536));
-      raw.insert(raw.end(), {static_cast<cl_uchar>(view.back()), static_cast<cl_uchar>(view.back() >> 8)});
     }
   }
   ocl::Context context(testing::any_device());
   const int padding = 19;
   Census census(context, size, PixelType::kU16, MatchingCost::kCensus9x7, padding, pixels);
-  ocl::Buffer<cl_uchar> images(context, raw.size());
   ocl::Buffer<cl_uint> codes(context, Census::words(MatchingCost::kCensus9x7, size, padding));
-  images.write(context, raw);
-  census.encode_alike(images, codes);
+  census.encode_alike(both(context, views, PixelType::kU16), codes);
   const auto expected =
       reference::padded_codes(size, reference::alike_codes(size, views[0]), reference::alike_codes(size, views[1]),
                               padding, MatchingCost::kCensus9x7);

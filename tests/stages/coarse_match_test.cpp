@@ -6,8 +6,7 @@
 #include <random>
 
 #include "tests/reference/coarse_match.h"
-#include "tests/support/compare.h"
-#include "tests/support/device.h"
+#include "tests/support/stage_case.h"
 
 namespace egosgm {
 namespace {
@@ -33,25 +32,16 @@ std::vector<float> run(shared::ImageSize size, const MethodOptions& options, con
                        PixelType type) {
   ocl::Context context(testing::any_device());
   CoarseMatch stage(context, size, options);
-  std::vector<cl_uchar> bytes;
-  for (const int grey : images) {
-    bytes.push_back(static_cast<cl_uchar>(grey));
-    if (type == PixelType::kU16) bytes.push_back(static_cast<cl_uchar>(grey >> 8));
-  }
-  FrameImages on_device{ocl::Buffer<cl_uchar>(context, bytes.size()), type};
-  on_device.pixels.write(context, bytes);
   Map found(context, 2 * pixel_count(CoarseMatch::coarse_size(size)));
   stage.prepare(type);
-  stage.match(on_device, found);
+  stage.match(testing::images_of(context, images, type), found);
   return found.read(context);
 }
 
 using Case = std::tuple<shared::ImageSize, PixelType>;
 
 std::string name(const ::testing::TestParamInfo<Case>& info) {
-  const shared::ImageSize size = std::get<0>(info.param);
-  return std::to_string(size.width) + "x" + std::to_string(size.height) +
-         (std::get<1>(info.param) == PixelType::kU8 ? "_8bit" : "_16bit");
+  return testing::name_of(std::get<0>(info.param), std::get<1>(info.param));
 }
 
 class CoarseMatchTest : public ::testing::TestWithParam<Case> {};
@@ -72,9 +62,7 @@ TEST_P(CoarseMatchTest, EqualsReference) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, CoarseMatchTest,
-                         ::testing::Combine(::testing::Values(shared::ImageSize{1, 1}, shared::ImageSize{7, 5},
-                                                              shared::ImageSize{65, 3}, shared::ImageSize{127, 33},
-                                                              shared::ImageSize{320, 97}),
+                         ::testing::Combine(::testing::ValuesIn(testing::kSizes),
                                             ::testing::Values(PixelType::kU8, PixelType::kU16)),
                          name);
 

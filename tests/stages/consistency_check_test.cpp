@@ -7,14 +7,12 @@
 #include <utility>
 
 #include "tests/reference/consistency_check.h"
-#include "tests/support/compare.h"
-#include "tests/support/device.h"
-#include "tests/support/device_maps.h"
+#include "tests/support/stage_case.h"
 
 namespace egosgm {
 namespace {
 
-constexpr float kNone = EGOSGM_INVALID_DISPARITY;
+using testing::kNone;
 
 std::vector<float> check(shared::ImageSize size, float max_difference_px, const testing::HostMaps& maps,
                          OutsideView outside = OutsideView::kDrop, int pixels = 0, Views views = Views::kBoth) {

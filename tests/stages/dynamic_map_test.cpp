@@ -8,14 +8,12 @@
 
 #include "host/stages/forward_warp.h"
 #include "tests/reference/dynamic_map.h"
-#include "tests/support/compare.h"
-#include "tests/support/device.h"
-#include "tests/support/random_maps.h"
+#include "tests/support/stage_case.h"
 
 namespace egosgm {
 namespace {
 
-constexpr float kNone = EGOSGM_INVALID_DISPARITY;
+using testing::kNone;
 const Calibration kCalibration{.fx = 100, .fy = 100, .cx = 50, .cy = 30, .baseline_m = 0.5};  // Z = 50 / d
 
 Motion ahead(double metres) {
@@ -28,17 +26,8 @@ using View = reference::LeftView;
 
 struct OnDevice {
   OnDevice(ocl::Context& context, shared::ImageSize size, const View& view, DynamicMap& stage)
-      : halved(context, pixel_count(DynamicMap::half(size))), disparity(context, 2 * pixel_count(size)) {
-    FrameImages images{ocl::Buffer<cl_uchar>(context, 2 * 2 * pixel_count(size)),
-                       view.bits == 8 ? PixelType::kU8 : PixelType::kU16};
-    std::vector<cl_uchar> bytes;
-    for (const int grey : view.greys) {
-      bytes.push_back(static_cast<cl_uchar>(grey));
-      if (view.bits == 16) bytes.push_back(static_cast<cl_uchar>(grey >> 8));
-    }
-    images.pixels.write(context, bytes);
-    disparity.write(context, view.disparity);
-    stage.keep(images, halved);
+      : halved(context, pixel_count(DynamicMap::half(size))), disparity(testing::on_device(context, view.disparity)) {
+    stage.keep(testing::images_of(context, view.greys, view.bits == 8 ? PixelType::kU8 : PixelType::kU16), halved);
     context.wait();
   }
   ocl::Buffer<cl_ushort> halved;
@@ -50,8 +39,7 @@ std::vector<cl_uchar> marks_of(shared::ImageSize size, const View& last, const V
   ocl::Context context(testing::any_device());
   DynamicMap stage(context, size, kCalibration, DynamicMap::levels(context, size), pixels);
   const OnDevice first(context, size, last, stage), second(context, size, current, stage);
-  ocl::Buffer<cl_uchar> marks(context, pixel_count(size));
-  marks.write(context, std::vector<cl_uchar>(pixel_count(size), 99));  // must not shine through
+  ocl::Buffer<cl_uchar> marks = testing::on_device<cl_uchar>(context, pixel_count(size), 99);
   stage.mark({first.halved, first.disparity}, {second.halved, second.disparity}, motion, marks);
   return marks.read(context);
 }

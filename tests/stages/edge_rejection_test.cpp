@@ -1,17 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/stages/edge_rejection.h"
 
-#include <gtest/gtest.h>
-
 #include "tests/reference/edge_rejection.h"
-#include "tests/support/compare.h"
-#include "tests/support/device.h"
-#include "tests/support/device_maps.h"
+#include "tests/support/stage_case.h"
 
 namespace egosgm {
 namespace {
 
-constexpr float kNone = EGOSGM_INVALID_DISPARITY;
+using testing::kNone;
 
 std::vector<float> reject(shared::ImageSize size, float max_jump_px, const testing::HostMaps& maps, int pixels = 0) {
   ocl::Context context(testing::any_device());

@@ -10,14 +10,12 @@
 #include "host/stages/coarse_match.h"
 #include "tests/reference/census.h"
 #include "tests/reference/evidence.h"
-#include "tests/support/compare.h"
-#include "tests/support/device.h"
-#include "tests/support/device_maps.h"
+#include "tests/support/stage_case.h"
 
 namespace egosgm {
 namespace {
 
-constexpr float kNone = EGOSGM_INVALID_DISPARITY;
+using testing::kNone;
 constexpr int kDisparities = 24;
 
 MethodOptions options() {
@@ -84,19 +82,13 @@ reference::BlockEvidence evidence_of(const Images& images, bool has_coarse, cons
   const shared::ImageSize size = images.size, quarter = images.coarse_size();
   const int padding = BandedSgm::code_padding(range_of(options()));
   const reference::ViewCodes of_views = images.codes();
-  ocl::Buffer<cl_uint> codes(context, Census::words(MatchingCost::kCensus9x7, size, padding));
-  codes.write(context, reference::padded_codes(size, of_views.of_view[0], of_views.of_view[1], padding,
-                                               MatchingCost::kCensus9x7));
-  ocl::Buffer<cl_uchar> coarse_images(context, 2 * 2 * pixel_count(quarter));
-  std::vector<cl_uchar> bytes;
-  for (const auto& view : images.coarse) {
-    for (const std::uint16_t grey : view)
-      bytes.insert(bytes.end(), {static_cast<cl_uchar>(grey), static_cast<cl_uchar>(grey >> 8)});
-  }
-  coarse_images.write(context, bytes);
-  Map coarse_disparity(context, 2 * pixel_count(quarter));
-  coarse_disparity.write(context, found);
-  const CoarseView coarse{coarse_images, coarse_disparity};
+  const auto codes = testing::on_device(context, reference::padded_codes(size, of_views.of_view[0], of_views.of_view[1],
+                                                                         padding, MatchingCost::kCensus9x7));
+  std::vector<std::uint16_t> greys = images.coarse[0];
+  greys.insert(greys.end(), images.coarse[1].begin(), images.coarse[1].end());
+  const FrameImages coarse_images = testing::images_of(context, greys, PixelType::kU16);
+  const Map coarse_disparity = testing::on_device(context, found);
+  const CoarseView coarse{coarse_images.pixels, coarse_disparity};
   const StereoMaps prediction = testing::upload(context, size, predicted);
   const StereoMaps measurement = testing::upload(context, size, measured);
   BlockEvidence blocks(context, size);
@@ -253,8 +245,7 @@ TEST(Evidence, GivesOutWhatHasMuchOrIsSupported) {
     for (const Views tracked : {Views::kBoth, Views::kLeft}) {
       ocl::Context context(testing::any_device());
       const StereoMaps on_device = testing::upload(context, kSmall, maps);
-      FlagMap evidence(context, maps.evidence.size());
-      evidence.write(context, maps.evidence);
+      FlagMap evidence = testing::on_device(context, maps.evidence);
       Map published = testing::upload(context, kSmall, testing::random_maps(kSmall, 0, 9, 0.2, 9)).disparity;
       Evidence stage(context, kSmall, options(), pixels);
       const std::vector<float> expected = reference::confirmed(kSmall, maps, tracked == Views::kLeft);
@@ -281,8 +272,7 @@ TEST(Evidence, GivesOutWhatHasLittleWithinASurface) {
       --supporters;
     }
     ocl::Context context(testing::any_device());
-    FlagMap evidence(context, maps.evidence.size());
-    evidence.write(context, maps.evidence);
+    FlagMap evidence = testing::on_device(context, maps.evidence);
     Map published(context, maps.disparity.size());
     Evidence(context, kSurface, options())
         .publish(testing::upload(context, kSurface, maps).disparity, evidence, published, Views::kBoth, Views::kBoth);

@@ -9,14 +9,12 @@
 
 #include "tests/reference/disparity_space.h"
 #include "tests/reference/forward_warp.h"
-#include "tests/support/compare.h"
-#include "tests/support/device.h"
-#include "tests/support/device_maps.h"
+#include "tests/support/stage_case.h"
 
 namespace egosgm {
 namespace {
 
-constexpr float kNone = EGOSGM_INVALID_DISPARITY;
+using testing::kNone;
 constexpr shared::ImageSize kSize{101, 61};
 constexpr shared::DisparityRange kRange{0, 64};
 const Calibration kCalibration{.fx = 100, .fy = 100, .cx = 50, .cy = 30, .baseline_m = 0.5};  // Z = 50 / d
@@ -28,9 +26,10 @@ testing::HostMaps warp(shared::ImageSize size, const Calibration& calibration, s
   ForwardWarp stage(context, size, calibration, {.process_noise_px2 = process_noise_px2}, range, pixels);
   const StereoMaps in = testing::upload(context, size, belief);
   StereoMaps out = testing::upload(context, size, testing::earlier_maps(size));
-  FlagMap evidence(context, 2 * pixel_count(size)), moved(context, 2 * pixel_count(size));
-  evidence.write(context, belief.evidence.empty() ? std::vector<cl_uchar>(evidence.size()) : belief.evidence);
-  moved.write(context, std::vector<cl_uchar>(moved.size(), 77));
+  const std::size_t pixels_of_both = 2 * pixel_count(size);
+  const FlagMap evidence =
+      testing::on_device(context, belief.evidence.empty() ? std::vector<cl_uchar>(pixels_of_both) : belief.evidence);
+  FlagMap moved = testing::on_device<cl_uchar>(context, pixels_of_both, 77);
   stage.warp(in, evidence, motion, out, moved, views);
   testing::HostMaps maps = testing::download_marked(context, out);
   maps.evidence = moved.read(context);

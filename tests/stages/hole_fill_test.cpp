@@ -6,14 +6,12 @@
 #include <algorithm>
 
 #include "tests/reference/hole_fill.h"
-#include "tests/support/compare.h"
-#include "tests/support/device.h"
-#include "tests/support/device_maps.h"
+#include "tests/support/stage_case.h"
 
 namespace egosgm {
 namespace {
 
-constexpr float kNone = EGOSGM_INVALID_DISPARITY;
+using testing::kNone;
 
 testing::HostMaps fill(shared::ImageSize size, float max_difference_px, const testing::HostMaps& maps, int pixels = 0,
                        Views views = Views::kBoth) {
@@ -21,8 +19,7 @@ testing::HostMaps fill(shared::ImageSize size, float max_difference_px, const te
   HoleFill stage(context, size, {.max_difference_px = max_difference_px}, pixels);
   const StereoMaps in = testing::upload(context, size, testing::with_marks(maps));
   StereoMaps out = testing::upload(context, size, testing::earlier_maps(size));
-  FlagMap hidden(context, in.disparity.size());
-  hidden.write(context, std::vector<cl_uchar>(hidden.size(), 9));
+  FlagMap hidden = testing::on_device<cl_uchar>(context, in.disparity.size(), 9);
   stage.fill(in, out, hidden, views);
   testing::HostMaps filled = testing::download(context, out);
   filled.hidden = hidden.read(context);

@@ -6,23 +6,12 @@
 #include <random>
 
 #include "tests/reference/kalman_update.h"
-#include "tests/support/compare.h"
-#include "tests/support/device.h"
-#include "tests/support/device_maps.h"
+#include "tests/support/stage_case.h"
 
 namespace egosgm {
 namespace {
 
-constexpr float kNone = EGOSGM_INVALID_DISPARITY;
-
-/// Values of blocks as the device has them.
-template <typename T>
-std::vector<T> in_padded_rows(shared::ImageSize size, const std::vector<T>& values) {
-  const int columns = (size.width + 3) / 4, stride = (size.width + 15) / 16 * 4;
-  std::vector<T> padded(values.size() / columns * stride);
-  for (std::size_t i = 0; i < values.size(); ++i) padded[i / columns * stride + i % columns] = values[i];
-  return padded;
-}
+using testing::kNone;
 
 testing::HostMaps update(shared::ImageSize size, const KalmanUpdateOptions& options, const testing::HostMaps& predicted,
                          const testing::HostMaps& measured, int pixels = 0, Views views = Views::kBoth,
@@ -32,17 +21,15 @@ testing::HostMaps update(shared::ImageSize size, const KalmanUpdateOptions& opti
   const StereoMaps prediction = testing::upload(context, size, predicted);
   const StereoMaps measurement = testing::upload(context, size, measured);
   StereoMaps out = testing::upload(context, size, testing::earlier_maps(size));
-  FlagMap hidden(context, predicted.disparity.size());
-  hidden.write(context, predicted.hidden.empty() ? std::vector<cl_uchar>(hidden.size()) : predicted.hidden);
-  FlagMap doubtful(context, predicted.disparity.size());
-  doubtful.write(context, std::vector<cl_uchar>(doubtful.size(), 9));
+  const std::vector<cl_uchar> none(predicted.disparity.size());
+  const FlagMap hidden = testing::on_device(context, predicted.hidden.empty() ? none : predicted.hidden);
+  FlagMap doubtful = testing::on_device<cl_uchar>(context, none.size(), 9);
   BlockEvidence blocks(context, size);
-  FlagMap before(context, predicted.disparity.size()), after(context, predicted.disparity.size());
-  after.write(context, std::vector<cl_uchar>(after.size(), 7));
+  FlagMap before(context, none.size()), after = testing::on_device<cl_uchar>(context, none.size(), 7);
   if (evidence) {
     before.write(context, evidence->before);
-    blocks.evidence.write(context, in_padded_rows(size, evidence->blocks.evidence));
-    blocks.found.write(context, in_padded_rows(size, evidence->blocks.found));
+    blocks.evidence.write(context, testing::in_padded_rows(size, evidence->blocks.evidence));
+    blocks.found.write(context, testing::in_padded_rows(size, evidence->blocks.found));
   }
   const KalmanUpdate::FrameEvidence of_frame{before, blocks, evidence && evidence->repeats};
   stage.update(hidden, prediction, measurement, evidence ? &of_frame : nullptr, out, doubtful, after, views);

@@ -6,14 +6,12 @@
 #include <algorithm>
 
 #include "tests/reference/median_filter.h"
-#include "tests/support/compare.h"
-#include "tests/support/device.h"
-#include "tests/support/device_maps.h"
+#include "tests/support/stage_case.h"
 
 namespace egosgm {
 namespace {
 
-constexpr float kNone = EGOSGM_INVALID_DISPARITY;
+using testing::kNone;
 
 /// What becomes of a pixel without a disparity.
 enum class Holes { kLeave, kFill };

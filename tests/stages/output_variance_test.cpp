@@ -8,14 +8,12 @@
 
 #include "tests/reference/method.h"
 #include "tests/reference/output_variance.h"
-#include "tests/support/compare.h"
-#include "tests/support/device.h"
-#include "tests/support/device_maps.h"
+#include "tests/support/stage_case.h"
 
 namespace egosgm {
 namespace {
 
-constexpr float kNone = EGOSGM_INVALID_DISPARITY;
+using testing::kNone;
 constexpr float kUntouched = -77;
 
 std::vector<float> output_variance(shared::ImageSize size, const std::vector<float>& given_out,
@@ -24,11 +22,8 @@ std::vector<float> output_variance(shared::ImageSize size, const std::vector<flo
   ocl::Context context(testing::any_device());
   OutputVariance stage(context, size, options, pixels);
   const StereoMaps maps = testing::upload(context, size, in), measured = testing::upload(context, size, measured_in);
-  ocl::Buffer<float> variance(context, in.variance.size());
-  variance.write(context, std::vector<float>(in.variance.size(), kUntouched));
-  Map given(context, given_out.size());
-  given.write(context, given_out);
-  stage.compute(given, maps, measured, variance, views);
+  Map variance = testing::on_device(context, in.variance.size(), kUntouched);
+  stage.compute(testing::on_device(context, given_out), maps, measured, variance, views);
   const testing::HostMaps after = testing::download(context, maps);
   EXPECT_EQ(after.disparity, in.disparity);
   EXPECT_EQ(after.variance, testing::masked(in).variance);

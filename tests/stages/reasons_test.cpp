@@ -9,14 +9,12 @@
 #include "host/stages/banded_sgm.h"
 #include "host/stages/census.h"
 #include "tests/reference/reasons.h"
-#include "tests/support/compare.h"
-#include "tests/support/device.h"
-#include "tests/support/device_maps.h"
+#include "tests/support/stage_case.h"
 
 namespace egosgm {
 namespace {
 
-constexpr float kNone = EGOSGM_INVALID_DISPARITY;
+using testing::kNone;
 
 PixelType type_of(const reference::ReasonInputs& inputs) {
   return inputs.white == 255 ? PixelType::kU8 : PixelType::kU16;
@@ -24,15 +22,9 @@ PixelType type_of(const reference::ReasonInputs& inputs) {
 
 /// Of both views; black is what `inputs` does not have.
 FrameImages upload_images(ocl::Context& context, shared::ImageSize size, const reference::ReasonInputs& inputs) {
-  FrameImages images{ocl::Buffer<cl_uchar>(context, 4 * pixel_count(size)), type_of(inputs)};
-  std::vector<cl_uchar> bytes;
-  for (const int grey : inputs.images) {
-    bytes.push_back(static_cast<cl_uchar>(grey & 255));
-    if (images.type == PixelType::kU16) bytes.push_back(static_cast<cl_uchar>(grey >> 8));
-  }
+  std::vector<cl_uchar> bytes = testing::bytes_of(inputs.images, type_of(inputs));
   bytes.resize(4 * pixel_count(size));
-  images.pixels.write(context, bytes);
-  return images;
+  return {testing::on_device(context, bytes), type_of(inputs)};
 }
 
 /// Fills in the codes of the inputs.
@@ -52,23 +44,16 @@ std::vector<cl_uchar> reasons_of(shared::ImageSize size, const MethodOptions& op
   if (!inputs.hidden.empty()) prediction.hidden.write(context, inputs.hidden);
   const StereoMaps belief = testing::upload(context, size, inputs.belief);
   const StereoMaps measured = testing::upload(context, size, {inputs.measured, inputs.measured});
-  FlagMap doubtful(context, 2 * pixel_count(size));
-  doubtful.write(context, inputs.doubtful);
+  const FlagMap doubtful = testing::on_device(context, inputs.doubtful);
   FlagMap evidence(context, 2 * pixel_count(size));
   if (!inputs.evidence.empty()) evidence.write(context, inputs.evidence);
-  const int columns = (size.width + 3) / 4, stride = (size.width + 15) / 16 * 4;
-  std::vector<cl_int> blocks(static_cast<std::size_t>(stride) * ((size.height + 3) / 4));
-  for (std::size_t i = 0; i < inputs.block_evidence.size(); ++i) {
-    blocks[i / columns * stride + i % columns] = inputs.block_evidence[i];
-  }
-  ocl::Buffer<cl_int> block_evidence(context, blocks.size());
-  block_evidence.write(context, blocks);
+  std::vector<int> blocks = inputs.block_evidence;
+  blocks.resize(static_cast<std::size_t>((size.width + 3) / 4) * ((size.height + 3) / 4));
+  const auto block_evidence = testing::on_device(context, testing::in_padded_rows(size, blocks));
   std::vector<cl_ushort> begins;
   for (const float d : inputs.consistent) begins.push_back(d == kNone ? 0xffff : 0);
-  ocl::Buffer<cl_ushort> runs(context, begins.size());
-  runs.write(context, begins);
-  ocl::Buffer<cl_uchar> found(context, pixel_count(size));
-  found.write(context, std::vector<cl_uchar>(pixel_count(size), 99));  // must not shine through
+  const auto runs = testing::on_device(context, begins);
+  auto found = testing::on_device<cl_uchar>(context, pixel_count(size), 99);
   Reasons reasons(context, size, images.type, options, Reasons::repeats(context, size), pixels);
   reasons.explain(
       {{images, codes, inputs.grey_step, measured, options.speckle_removal.max_size_px > 0 ? &runs : nullptr},

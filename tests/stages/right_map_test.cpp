@@ -7,14 +7,12 @@
 #include <utility>
 
 #include "tests/reference/right_map.h"
-#include "tests/support/compare.h"
-#include "tests/support/device.h"
-#include "tests/support/device_maps.h"
+#include "tests/support/stage_case.h"
 
 namespace egosgm {
 namespace {
 
-constexpr float kNone = EGOSGM_INVALID_DISPARITY;
+using testing::kNone;
 using Row = std::vector<float>;
 
 testing::HostMaps right_map(shared::ImageSize size, shared::DisparityRange range, float max_difference_px,

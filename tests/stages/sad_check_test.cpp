@@ -4,12 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstring>
 
 #include "tests/reference/sad_check.h"
-#include "tests/support/compare.h"
-#include "tests/support/device.h"
-#include "tests/support/device_maps.h"
+#include "tests/support/stage_case.h"
 
 namespace egosgm {
 namespace {
@@ -17,25 +14,12 @@ namespace {
 using testing::HostMaps;
 using testing::same_bits;
 
-std::vector<cl_uchar> bytes_of(const std::vector<int>& images, PixelType type) {
-  std::vector<cl_uchar> bytes(images.size() * (type == PixelType::kU16 ? 2 : 1));
-  for (std::size_t i = 0; i < images.size(); ++i) {
-    const auto wide = static_cast<cl_ushort>(images[i]);
-    if (type == PixelType::kU16) std::memcpy(&bytes[2 * i], &wide, 2);
-    if (type == PixelType::kU8) bytes[i] = static_cast<cl_uchar>(images[i]);
-  }
-  return bytes;
-}
-
 std::vector<float> run(shared::ImageSize size, PixelType type, const SadCheckOptions& options,
                        const std::vector<int>& images, const HostMaps& maps, int pixels = 0) {
   ocl::Context context(testing::any_device());
   SadCheck stage(context, size, type, options, pixels);
-  const auto bytes = bytes_of(images, type);
-  ocl::Buffer<cl_uchar> device_images(context, bytes.size());
-  device_images.write(context, bytes);
   Map checked = testing::upload(context, size, maps).disparity;
-  stage.check(device_images, checked);
+  stage.check(testing::images_of(context, images, type).pixels, checked);
   return checked.read(context);
 }
 

@@ -9,9 +9,7 @@
 
 #include "host/frame/frame_transfer.h"
 #include "tests/reference/search_band.h"
-#include "tests/support/compare.h"
-#include "tests/support/device.h"
-#include "tests/support/device_maps.h"
+#include "tests/support/stage_case.h"
 
 namespace egosgm {
 namespace {

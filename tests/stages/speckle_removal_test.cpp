@@ -1,12 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/stages/speckle_removal.h"
 
-#include <gtest/gtest.h>
-
 #include "tests/reference/speckle_removal.h"
-#include "tests/support/compare.h"
-#include "tests/support/device.h"
-#include "tests/support/random_maps.h"
+#include "tests/support/stage_case.h"
 
 namespace egosgm {
 namespace {
@@ -20,10 +16,9 @@ Row run(shared::ImageSize size, const SpeckleRemovalOptions& options, const Host
         int row_group = 0, Views views = Views::kBoth) {
   ocl::Context context(testing::any_device());
   SpeckleRemoval stage(context, size, options, strip_rows, row_group);
-  Map on_device(context, maps.disparity.size());
-  on_device.write(context, maps.disparity);
-  stage.remove(on_device, views);
-  return on_device.read(context);
+  Map kept = testing::on_device(context, maps.disparity);
+  stage.remove(kept, views);
+  return kept.read(context);
 }
 
 /// Disparities with the same shape from row to row, so that regions of all sizes and tangled outlines come about.

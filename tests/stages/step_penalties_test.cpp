@@ -6,8 +6,7 @@
 #include <random>
 
 #include "tests/reference/step_penalties.h"
-#include "tests/support/compare.h"
-#include "tests/support/device.h"
+#include "tests/support/stage_case.h"
 
 namespace egosgm {
 namespace {
@@ -16,17 +15,10 @@ constexpr cl_uchar kUntouched = 7;
 
 std::vector<std::uint8_t> penalties(shared::ImageSize size, const std::vector<std::uint16_t>& grey, PixelType type,
                                     const BandedSgmOptions& options, int pixels = 0, Views views = Views::kBoth) {
-  std::vector<cl_uchar> raw;
-  for (const std::uint16_t value : grey) {
-    raw.push_back(static_cast<cl_uchar>(value));
-    if (type == PixelType::kU16) raw.push_back(static_cast<cl_uchar>(value >> 8));
-  }
   ocl::Context context(testing::any_device());
   StepPenalties penalties(context, size, type, options, pixels);
-  ocl::Buffer<cl_uchar> images(context, raw.size()), steps(context, StepPenalties::bytes(size));
-  images.write(context, raw);
-  steps.write(context, std::vector<cl_uchar>(steps.size(), kUntouched));
-  penalties.compute(images, steps, views);
+  auto steps = testing::on_device(context, StepPenalties::bytes(size), kUntouched);
+  penalties.compute(testing::images_of(context, grey, type).pixels, steps, views);
   return steps.read(context);
 }
 

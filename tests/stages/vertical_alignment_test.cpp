@@ -8,9 +8,7 @@
 #include <random>
 
 #include "tests/reference/vertical_alignment.h"
-#include "tests/support/compare.h"
-#include "tests/support/device.h"
-#include "tests/support/device_maps.h"
+#include "tests/support/stage_case.h"
 
 namespace egosgm {
 namespace {
@@ -57,18 +55,11 @@ struct Scene {
     }
   }
 
-  int bytes_per_pixel() const { return type == PixelType::kU8 ? 1 : 2; }
   int grey() const { return type == PixelType::kU8 ? 1 : 256; }
 };
 
 FrameImages upload(ocl::Context& context, const Scene& scene) {
-  std::vector<cl_uchar> raw;
-  for (const int value : scene.images) {
-    for (int b = 0; b < scene.bytes_per_pixel(); ++b) raw.push_back(static_cast<cl_uchar>(value >> (8 * b)));
-  }
-  FrameImages images{ocl::Buffer<cl_uchar>(context, raw.size()), scene.type};
-  images.pixels.write(context, raw);
-  return images;
+  return testing::images_of(context, scene.images, scene.type);
 }
 
 std::vector<int> download(ocl::Context& context, const FrameImages& images, const Scene& scene) {
@@ -124,8 +115,7 @@ using Case = std::tuple<shared::ImageSize, PixelType, int>;
 
 std::string name(const ::testing::TestParamInfo<Case>& info) {
   const auto [size, type, row_group] = info.param;
-  return std::to_string(size.width) + "x" + std::to_string(size.height) +
-         (type == PixelType::kU8 ? "_8bit" : "_16bit") + "_by_" + std::to_string(row_group);
+  return testing::name_of(size, type) + "_by_" + std::to_string(row_group);
 }
 
 class VerticalAlignmentTest : public ::testing::TestWithParam<Case> {};
