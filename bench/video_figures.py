@@ -10,8 +10,8 @@ import pathlib
 import numpy as np
 
 import egosgm
-from egosgm.pose_evaluation import inverse
-from egosgm.video_evaluation import BAD_PX, is_valid, move
+from egosgm.evaluation.pose_evaluation import inverse
+from egosgm.evaluation.video_evaluation import BAD_PX, is_valid, move
 
 SINGLE_FRAME = {"temporal": False}
 

@@ -55,7 +55,7 @@ class Held {
   py::object object_;
 };
 
-/// egosgm.bag_program.BagSource.
+/// egosgm.bag.program.BagSource.
 class BagSource : public vision::FrameSource {
  public:
   BagSource(py::object bag, vision::FrameRange range, const std::string& out) : bag_(std::move(bag)), range_(range) {
@@ -134,7 +134,7 @@ class BagSource : public vision::FrameSource {
   bool has_given_ = false;
 };
 
-/// egosgm.bag_program.Outputs.
+/// egosgm.bag.program.Outputs.
 class Outputs : public app::FrameSink {
  public:
   explicit Outputs(py::object outputs) : outputs_(std::move(outputs)) {}
@@ -210,7 +210,7 @@ vision::StereoSequence open_input(std::vector<std::string> words, const py::obje
   return arguments.open(/*needs_calibration=*/false, reader_of(read));
 }
 
-/// The program's exit code. `package`: what opens bags and outputs, see egosgm.bag_program.
+/// The program's exit code. `package`: what opens bags and outputs, see egosgm.bag.program.
 int main_of(const std::vector<std::string>& arguments, const py::object& package) {
   app::Package hooks;
   hooks.open_bag = [&](const app::BagArguments& given, const std::string& calib, vision::FrameRange range,

@@ -27,16 +27,16 @@ _cpu_driver.show()  # before the library is loaded, which asks the loader
 from . import _egosgm
 from ._egosgm import *  # noqa: F401,F403
 from ._egosgm import __version__
-from .calibrations import read_calibration, read_euroc_rig, read_opencv_rig
-from .depth import depth_sigma_from_disparity
+from .calibration.reader import read_calibration, read_euroc_rig, read_opencv_rig
+from .geometry.depth import depth_sigma_from_disparity
 from .drive import Drive, DriveFrame, run
-from .examination import match_pair
+from .diagnostics.examination import match_pair
 from .matcher import Matcher
-from .points import PointCloud, point_cloud, write_ply
-from .pose_evaluation import MotionError, PoseEvaluation, SegmentError, evaluate_poses
-from .rectification import Rectification, StereoRig
+from .geometry.points import PointCloud, point_cloud, write_ply
+from .evaluation.pose_evaluation import MotionError, PoseEvaluation, SegmentError, evaluate_poses
+from .calibration.rectification import Rectification, StereoRig
 from .values import as_dataclass as _as_dataclass
-from .video_evaluation import DensityFigures, RegionFigures, VideoEvaluation, VideoFigures, evaluate_video, move_map
+from .evaluation.video_evaluation import DensityFigures, RegionFigures, VideoEvaluation, VideoFigures, evaluate_video, move_map
 
 __all__ = ["__version__", "read_calibration", "read_euroc_rig", "read_opencv_rig", "depth_sigma_from_disparity", "Rectification", "StereoRig", "Drive", "DriveFrame", "match_pair", "Matcher", "run", "PointCloud", "point_cloud", "write_ply", "MotionError", "PoseEvaluation", "SegmentError", "evaluate_poses", "DensityFigures", "RegionFigures", "VideoEvaluation", "VideoFigures", "evaluate_video", "move_map",
            *(name for name in dir(_egosgm) if not name.startswith("_"))]

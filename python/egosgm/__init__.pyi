@@ -8,30 +8,30 @@ from numpy.typing import ArrayLike, NDArray
 from typing_extensions import Unpack
 
 from ._options import FrameMaps, PipelineOptions, StereoOdometryOptions, SyntheticOptions
-from .calibrations import read_calibration as read_calibration
-from .calibrations import read_euroc_rig as read_euroc_rig
-from .calibrations import read_opencv_rig as read_opencv_rig
-from .depth import depth_sigma_from_disparity as depth_sigma_from_disparity
+from .calibration.reader import read_calibration as read_calibration
+from .calibration.reader import read_euroc_rig as read_euroc_rig
+from .calibration.reader import read_opencv_rig as read_opencv_rig
+from .geometry.depth import depth_sigma_from_disparity as depth_sigma_from_disparity
 from .drive import Drive as Drive
 from .drive import DriveFrame as DriveFrame
 from .drive import run as run
-from .examination import match_pair as match_pair
+from .diagnostics.examination import match_pair as match_pair
 from .matcher import Matcher as Matcher
-from .points import PointCloud as PointCloud
-from .points import point_cloud as point_cloud
-from .points import write_ply as write_ply
-from .pose_evaluation import MotionError as MotionError
-from .pose_evaluation import PoseEvaluation as PoseEvaluation
-from .pose_evaluation import SegmentError as SegmentError
-from .pose_evaluation import evaluate_poses as evaluate_poses
-from .rectification import Rectification as Rectification
-from .rectification import StereoRig as StereoRig
-from .video_evaluation import DensityFigures as DensityFigures
-from .video_evaluation import RegionFigures as RegionFigures
-from .video_evaluation import VideoEvaluation as VideoEvaluation
-from .video_evaluation import VideoFigures as VideoFigures
-from .video_evaluation import evaluate_video as evaluate_video
-from .video_evaluation import move_map as move_map
+from .geometry.points import PointCloud as PointCloud
+from .geometry.points import point_cloud as point_cloud
+from .geometry.points import write_ply as write_ply
+from .evaluation.pose_evaluation import MotionError as MotionError
+from .evaluation.pose_evaluation import PoseEvaluation as PoseEvaluation
+from .evaluation.pose_evaluation import SegmentError as SegmentError
+from .evaluation.pose_evaluation import evaluate_poses as evaluate_poses
+from .calibration.rectification import Rectification as Rectification
+from .calibration.rectification import StereoRig as StereoRig
+from .evaluation.video_evaluation import DensityFigures as DensityFigures
+from .evaluation.video_evaluation import RegionFigures as RegionFigures
+from .evaluation.video_evaluation import VideoEvaluation as VideoEvaluation
+from .evaluation.video_evaluation import VideoFigures as VideoFigures
+from .evaluation.video_evaluation import evaluate_video as evaluate_video
+from .evaluation.video_evaluation import move_map as move_map
 
 __version__: str
 INVALID_DISPARITY: float

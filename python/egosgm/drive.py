@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from . import _egosgm
 from .bag import Bag
-from .calibrations import read_calibration
-from .depth import depth_sigma_from_disparity
-from .rectification import StereoRig
+from .calibration.reader import read_calibration
+from .geometry.depth import depth_sigma_from_disparity
+from .calibration.rectification import StereoRig
 
 
 @dataclasses.dataclass(frozen=True, repr=False, eq=False)

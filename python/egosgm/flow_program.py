@@ -9,7 +9,7 @@ import numpy as np
 from . import _egosgm
 from .arguments import comparison_parser, counted, json_text, resolve_comparison, tell, text_argument
 from .run_folder import frames_of_run
-from .video_evaluation import BAD_PX, is_sky, percent
+from .evaluation.video_evaluation import BAD_PX, is_sky, percent
 from .video_program import read_flow
 
 _Path = pathlib.Path

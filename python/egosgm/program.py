@@ -65,7 +65,8 @@ def _lead_interrupts(handler: Any) -> None:
 
 def _run_program(arguments: Sequence[str]) -> int:
     """A command in C++, in this process."""
-    from . import _egosgm, bag_program
+    from . import _egosgm
+    from .bag import program as bag_program
     return _egosgm._main([os.fsencode(argument) for argument in arguments], bag_program)
 
 

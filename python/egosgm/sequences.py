@@ -10,7 +10,7 @@ from typing import Any, List, NamedTuple, Optional, Tuple
 
 from . import _egosgm
 from .arguments import text_argument
-from .calibrations import Found, find
+from .calibration.reader import Found, find
 
 _MOST_TIMES_BYTES = 1 << 28
 

@@ -10,11 +10,12 @@ from typing import Any, Dict, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from . import _egosgm, plots
+from . import _egosgm
+from .evaluation import plots
 from .arguments import comparison_parser, counted, decimal, json_text, Parser, resolve_comparison, tell, text_argument
-from .pose_evaluation import inverse
+from .evaluation.pose_evaluation import inverse
 from .run_folder import frames_of_run
-from .video_evaluation import Frame, VideoCounts, VideoFigures, count_frames, density_of, figures_of, regions_of
+from .evaluation.video_evaluation import Frame, VideoCounts, VideoFigures, count_frames, density_of, figures_of, regions_of
 
 _Path = pathlib.Path
 _MOST_FLOW_BYTES = 1 << 31

@@ -7,7 +7,7 @@ from typing import Any, Optional
 import numpy as np
 
 from . import _egosgm
-from .ros_images import depth_maps
+from .bag.ros_images import depth_maps
 
 
 class RerunOutput:

@@ -21,9 +21,10 @@ from rosbags.typesys import Stores, get_typestore
 import egosgm
 
 from egosgm import bag as bags
-from egosgm import bag_outputs, bag_program
-from egosgm import cloud as cloud_program
-from egosgm import ros_images
+from egosgm.bag import outputs as bag_outputs
+from egosgm.bag import program as bag_program
+from egosgm.bag import ros_images
+from egosgm.geometry import cloud as cloud_program
 
 WIDTH, HEIGHT, FRAMES = 320, 96, 3
 SEED = 7
@@ -112,7 +113,7 @@ def record(kind, path, street, frames, **how):
 
 def program(*arguments):
     """`egosgm run`."""
-    return subprocess.run([sys.executable, "-B", "-m", "egosgm.bag_program", *map(str, arguments)], capture_output=True, text=True, errors="replace", timeout=900)
+    return subprocess.run([sys.executable, "-B", "-m", "egosgm.bag.program", *map(str, arguments)], capture_output=True, text=True, errors="replace", timeout=900)
 
 
 @pytest.mark.parametrize("kind, name", [("mcap", "drive"), ("sqlite", "drive"), ("ros1", "drive.bag")])
@@ -272,7 +273,7 @@ def test_a_calibration_that_changes_is_seen(tmp_path, street, frames):
 def test_what_ends_a_run_leaves_nothing_and_is_in_nobodys_way(tmp_path, street, frames):
     bag, out = record("mcap", tmp_path / "drive", street, frames * 40, times=[START + i * RATE_NS for i in range(40 * FRAMES)]), tmp_path / "out.mcap"
     for stop in (signal.SIGTERM, signal.SIGKILL):
-        process = subprocess.Popen([sys.executable, "-B", "-m", "egosgm.bag_program", "--bag", bag, *TOPICS, "--out", out, *SET],
+        process = subprocess.Popen([sys.executable, "-B", "-m", "egosgm.bag.program", "--bag", bag, *TOPICS, "--out", out, *SET],
                                    stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         while not [part for part in tmp_path.glob(".egosgm-*.part") if part.stat().st_size > 100_000]:  # at work
             assert process.poll() is None, process.stderr.read()
@@ -890,7 +891,8 @@ def test_a_full_disk_is_one_line(tmp_path, street, frames):
     """From the fourth frame on: by then the driver has written its kernel cache."""
     bag = record("mcap", tmp_path / "drive", street, [frames[i % FRAMES] for i in range(8)])
     limited = """import resource, sys
-from egosgm import bag, bag_program
+from egosgm import bag
+from egosgm.bag import program as bag_program
 plain = bag.Bag.frames
 def limited(self):
     for frame in plain(self):
@@ -1190,7 +1192,7 @@ def test_poses_of_another_unit_are_told(tmp_path, street, frames, capfd):
 
 def examined(capfd, path, *arguments):
     """Verdicts of `egosgm doctor` by check."""
-    from egosgm import doctor
+    from egosgm.diagnostics import doctor
     code = doctor.main(["--bag", str(path), *map(str, arguments), "--json"])
     findings = {found["check"]: found for found in json.loads(capfd.readouterr().out)}
     assert code == (2 if any(found["verdict"] == "problem" for found in findings.values()) else 0)
@@ -1198,7 +1200,7 @@ def examined(capfd, path, *arguments):
 
 
 def test_a_bag_is_known_without_its_option(tmp_path, street, frames, capfd):
-    from egosgm import doctor
+    from egosgm.diagnostics import doctor
     file, folder = record("mcap", tmp_path / "mcap", street, frames), record("sqlite", tmp_path / "sqlite", street, frames)
     for bag, out in ((file, "file"), (folder, "folder")):
         assert program(bag, *TOPICS, *SET, "--frames", ":1", "--out", tmp_path / out).returncode == 0

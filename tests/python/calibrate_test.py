@@ -12,7 +12,7 @@ import egosgm
 from egosgm import program
 
 cv2 = pytest.importorskip("cv2")
-from egosgm.calibrate import _check_stance
+from egosgm.calibration.calibrate import _check_stance
 
 WIDTH, HEIGHT, SQUARE, BASELINE = 480, 360, 0.03, 0.12
 LEFT = np.array([[420.0, 0, 236], [0, 424.0, 183], [0, 0, 1]]), np.array([-0.12, 0.03, 0.0006, -0.0004, 0])
@@ -136,13 +136,13 @@ def test_a_standard_output_that_is_full_costs_no_calibration(pictures, tmp_path,
     def full(text):
         raise egosgm.IoError("the standard output cannot be written")
 
-    monkeypatch.setattr("egosgm.calibrate.tell", full)
+    monkeypatch.setattr("egosgm.calibration.calibrate.tell", full)
     assert program.run_tool(command(pictures, tmp_path / "calib.yml")) == 1
     expect_the_cameras(tmp_path / "calib.yml")
 
 
 def test_of_the_many_views_of_a_video_some_are_taken(pictures, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("egosgm.calibrate._MOST_VIEWS", 6)
+    monkeypatch.setattr("egosgm.calibration.calibrate._MOST_VIEWS", 6)
     code, said = calibrate(pictures, tmp_path / "calib.yml", capsys)
     assert code == 0 and "; 6 of them are taken, evenly chosen" in said and said.count("  pair ") == 6
     assert "  pair   0:" in said and "  pair  11:" in said

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import egosgm
-from egosgm import cloud
-from egosgm.points import cloud_of_maps
+from egosgm.geometry import cloud
+from egosgm.geometry.points import cloud_of_maps
 
 WIDTH, HEIGHT = 6, 4
 CAMERA = dict(fx=100.0, fy=100.0, cx=2.0, cy=1.0, baseline_m=0.5, doffs_px=0.0)

@@ -17,7 +17,11 @@ import numpy as np
 import pytest
 
 import egosgm
-from egosgm import bag_program, cpu_driver, examination, points, ros_images, viewer
+from egosgm import cpu_driver, viewer
+from egosgm.bag import program as bag_program
+from egosgm.bag import ros_images
+from egosgm.diagnostics import examination
+from egosgm.geometry import points
 
 WIDTH, HEIGHT, FRAMES = 320, 96, 3
 SEED = 7

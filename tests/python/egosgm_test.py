@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 
 import egosgm
-from egosgm import cloud, program
+from egosgm import program
+from egosgm.geometry import cloud
 
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
 WIDTH, HEIGHT, FRAMES = 160, 64, 3

@@ -8,7 +8,8 @@ import egosgm
 import numpy as np
 import pytest
 
-from egosgm import plots, run_folder, video_program
+from egosgm import run_folder, video_program
+from egosgm.evaluation import plots
 
 
 def test_successors_differ_by_the_usual_distance():

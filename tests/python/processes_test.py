@@ -179,7 +179,7 @@ def png(width, height, bits, colour, **chunks):
 # SECURITY.md: a refused file below 64 KiB takes less than 256 MiB. What the node and bags decode goes through grey_of.
 @pytest.mark.parametrize("read", ["egosgm.read_grey(file)", "egosgm.read_color(file)", "egosgm.read_disparity(file)", "egosgm.open_folder(folder).size",
                                   "list(egosgm.run(folder, progress=False))",
-                                  'egosgm.ros_images.grey_of(types.SimpleNamespace(format="png", data=open(file, "rb").read()))'])
+                                  'egosgm.bag.ros_images.grey_of(types.SimpleNamespace(format="png", data=open(file, "rb").read()))'])
 @pytest.mark.parametrize("bomb", [png(8192, 4096, 8, 0, IDAT=zlib.compress(b"")), png(16384, 16384, 1, 3, PLTE=bytes(6), IDAT=zlib.compress(bytes(16384 * 2049), 9))],
                          ids=["header alone", "palette of one bit"])
 def test_a_small_file_that_says_a_huge_size_takes_little_memory(tmp_path, bomb, read):
@@ -190,7 +190,7 @@ def test_a_small_file_that_says_a_huge_size_takes_little_memory(tmp_path, bomb, 
     (tmp_path / "calib.txt").write_text("P0: 100 0 50 0 0 100 50 0 0 0 1 0\nP1: 100 0 50 -50 0 100 50 0 0 0 1 0\n")
     said = run(f"""
 import types
-import egosgm.ros_images
+import egosgm.bag.ros_images
 folder, file = {str(tmp_path)!r}, {str(tmp_path / "image_0/000000.png")!r}
 try:
     {read}

@@ -227,7 +227,7 @@ class Node(unittest.TestCase):
     @unittest.skipUnless(HAS_TF, "no tf2_ros")
     def test_motion_of_tf_is_taken(self):
         import egosgm
-        from egosgm.ros_images import BODY_FROM_OPTICAL
+        from egosgm.bag.ros_images import BODY_FROM_OPTICAL
         street = egosgm.SyntheticSequence(**STREET)
         told = self.run_three(RENDERED, RATE, parameters=("motion_frame:=odom", "tf_wait_s:=5.0"), tf=True)
         poses = [street.render(i).world_from_camera for i in range(RENDERED)]
@@ -323,7 +323,7 @@ class Parameters(unittest.TestCase):
 
     def test_points_are_certain_of_chosen_reasons_and_coloured(self):
         import egosgm
-        from egosgm.ros_images import rgb_of
+        from egosgm.bag.ros_images import rgb_of
         from egosgm_ros.messages import points_of
         from sensor_msgs.msg import Image
         from std_msgs.msg import Header

@@ -10,7 +10,7 @@ from sensor_msgs.msg import Image, PointCloud2, PointField
 from stereo_msgs.msg import DisparityImage
 
 import egosgm
-from egosgm.ros_images import BODY_FROM_OPTICAL, quaternion_of, ros_disparity, ros_range
+from egosgm.bag.ros_images import BODY_FROM_OPTICAL, quaternion_of, ros_disparity, ros_range
 
 
 def bytes_of(values: Any) -> array.array:

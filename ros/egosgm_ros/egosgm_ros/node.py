@@ -26,7 +26,7 @@ from stereo_msgs.msg import DisparityImage
 
 import egosgm
 from egosgm.bag import Pairing
-from egosgm.ros_images import Cameras, are_raw, grey_of, is_named_rect, rgb_of, stamp_ns, variance_of_depth
+from egosgm.bag.ros_images import Cameras, are_raw, grey_of, is_named_rect, rgb_of, stamp_ns, variance_of_depth
 from egosgm_ros.messages import Path, disparity_of, image_of, odometry_of, points_of, transform_of
 from egosgm_ros.tf_motion import TfMotion, tf2_ros
 

@@ -7,7 +7,7 @@ from rclpy.duration import Duration
 from rclpy.time import Time
 
 import egosgm
-from egosgm.ros_images import rotation_of
+from egosgm.bag.ros_images import rotation_of
 
 
 class TfMotion:

@@ -6,10 +6,11 @@ from typing import Any, List, Sequence, Tuple
 
 import numpy as np
 
-from . import _egosgm, plots
-from .arguments import comparison_parser, counted, json_text, resolve_comparison, tell, text_argument
+from .. import _egosgm
+from . import plots
+from ..arguments import comparison_parser, counted, json_text, resolve_comparison, tell, text_argument
 from .pose_evaluation import PoseEvaluation, evaluate_poses
-from .run_folder import frames_of_run
+from ..run_folder import frames_of_run
 
 
 def _poses_file_of(name: str) -> Tuple[pathlib.Path, List[int]]:

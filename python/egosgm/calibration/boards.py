@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _egosgm
+from .. import _egosgm
 
 Corners = Dict[int, NDArray[np.float32]]  # (x, y) [px] by the corner's number on the board
 _STOP = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 0.001)

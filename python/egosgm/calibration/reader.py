@@ -11,10 +11,10 @@ from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, TypeVar
 
 import numpy as np
 
-from . import _egosgm
-from . import calibration_formats as formats
-from . import calibration_parts as parts
-from .calibration_formats import Found
+from .. import _egosgm
+from . import formats
+from . import parts
+from .formats import Found
 from .rectification import StereoRig
 
 _Path = Union[str, "os.PathLike[str]"]

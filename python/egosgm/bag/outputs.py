@@ -9,9 +9,9 @@ from typing import Any, Dict, Optional
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _egosgm
-from .bag import BagFrame
-from .points import cloud_of_maps
+from .. import _egosgm
+from . import BagFrame
+from ..geometry.points import cloud_of_maps
 from .ros_images import BODY_FROM_OPTICAL, depth_maps, needs, quaternion_of, ros_disparity, ros_range
 
 

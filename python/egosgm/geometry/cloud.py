@@ -7,8 +7,8 @@ from typing import Any, List, Sequence, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _egosgm
-from .arguments import counted, decimal, expect_new_file, Parser, read_json, tell
+from .. import _egosgm
+from ..arguments import counted, decimal, expect_new_file, Parser, read_json, tell
 from .points import cloud_of_maps, write_new_ply
 
 

@@ -8,8 +8,8 @@ import pathlib
 import re
 from typing import Any, Dict, Iterator, List, Optional, Sequence, Tuple
 
-from . import _egosgm
-from .arguments import counted
+from .. import _egosgm
+from ..arguments import counted
 
 os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")  # what OpenCV would say of a broken file stands in our message
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")

@@ -6,11 +6,12 @@ import sys
 import types
 from typing import Any, Dict, List, Optional, Sequence, Tuple
 
-from . import _egosgm, calibrations
-from .arguments import decimal
-from .bag import Bag, BagFrame
-from .bag_outputs import McapOutput
-from .viewer import RerunOutput
+from .. import _egosgm
+from ..calibration import reader as calibrations
+from ..arguments import decimal
+from . import Bag, BagFrame
+from .outputs import McapOutput
+from ..viewer import RerunOutput
 
 
 def read_calibration(file: pathlib.Path, size: Tuple[int, int]) -> _egosgm.Calibration:

@@ -5,8 +5,8 @@ from typing import Any, List, NamedTuple, Optional
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _egosgm
-from .arguments import counted
+from .. import _egosgm
+from ..arguments import counted
 
 _FEATURES, _FAST_THRESHOLD = 3000, 12
 _MOST_DESCRIPTOR_DISTANCE = 50  # of 256 bits

@@ -7,7 +7,7 @@ from typing import Any, List, Optional, Tuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _egosgm
+from .. import _egosgm
 
 _Matrix = NDArray[np.float64]
 _Rectangle = Tuple[int, int, int, int]

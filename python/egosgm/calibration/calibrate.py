@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _egosgm
-from .arguments import counted, decimal, expect_new_file, expect_new_folder, Parser, tell
+from .. import _egosgm
+from ..arguments import counted, decimal, expect_new_file, expect_new_folder, Parser, tell
 from .boards import Board, Corners, charuco, chessboard, drawn, other_size
 from .raw_pairs import RawPair, open_pairs
 from .rectification import StereoRig, projections

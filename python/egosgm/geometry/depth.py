@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _egosgm
+from .. import _egosgm
 
 
 def depth_sigma_from_disparity(disparity: ArrayLike, variance: ArrayLike, calibration: _egosgm.Calibration) -> NDArray[np.float32]:

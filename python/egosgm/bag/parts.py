@@ -5,7 +5,7 @@ import pathlib
 import tempfile
 from typing import Any, Iterator, List, Optional
 
-from . import _egosgm
+from .. import _egosgm
 from .ros_images import needs
 
 _SUFFIXES = (".mcap", ".db3", ".bag")

@@ -14,7 +14,7 @@ from typing import Any, Dict, Optional, Sequence, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _egosgm
+from .. import _egosgm
 from .rectification import StereoRig, is_transposed
 
 Matrix = NDArray[np.float64]

@@ -10,7 +10,7 @@ from typing import Any, Callable, Deque, Dict, Iterable, Iterator, List, Optiona
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import _egosgm
+from .. import _egosgm
 from .pose_evaluation import inverse, poses_of
 
 _Maps = Optional[Sequence[Optional[ArrayLike]]]

@@ -8,11 +8,11 @@ from typing import Any, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 import cv2  # noqa: F401  who lacks it is told at once
 import numpy as np
 
-from . import _egosgm
-from .arguments import counted, json_text, Parser, tell, whole_number
+from .. import _egosgm
+from ..arguments import counted, json_text, Parser, tell, whole_number
 from .examination import FEWEST_MATCHES, Examination, Finding, match_pair
-from .rectification import Rectification, StereoRig
-from .sequences import add_input, frame_times, open_input, open_without_calibration, words_of_input
+from ..calibration.rectification import Rectification, StereoRig
+from ..sequences import add_input, frame_times, open_input, open_without_calibration, words_of_input
 
 _MOST_GAP = 1.6  # of the usual time between two frames
 _LEAST_STEP_S, _MOST_STEP_S = 1e-4, 20.0  # between two frames
@@ -85,7 +85,7 @@ class _OfSequence(_Source):
 
 class _OfBag(_Source):
     def __init__(self, given: argparse.Namespace) -> None:
-        from .bag import Bag
+        from ..bag import Bag
         self._bag = Bag(given.bag, given.left_topic or "", given.right_topic or "", given.info_topics or (), max_skew_ms=given.max_skew_ms,
                         calib=given.calib or "")
         self._stamps: List[int] = []

@@ -9,8 +9,8 @@ from typing import Any, Dict, List, Optional, Tuple, Union
 
 import numpy as np
 
-from . import _egosgm
-from .calibration_parts import Camera, Matrix, Values, data_of, expect_size, expect_upright, matrix, of_four, refuse, rotation, size_of, text_of, transform
+from .. import _egosgm
+from .parts import Camera, Matrix, Values, data_of, expect_size, expect_upright, matrix, of_four, refuse, rotation, size_of, text_of, transform
 from .rectification import StereoRig
 
 Found = Union[StereoRig, _egosgm.Calibration]
@@ -75,7 +75,7 @@ def is_info(data: Dict[str, Any]) -> bool:
 
 
 def ros(files: List[pathlib.Path], contents: List[Dict[str, Any]], size: Optional[Tuple[int, int]]) -> Found:
-    from .ros_images import Cameras, are_raw
+    from ..bag.ros_images import Cameras, are_raw
     infos = [_Info(data, file) for data, file in zip(contents, files)]
     cameras = Cameras(*infos, any(are_raw(info, "") for info in infos), names=tuple(str(file) for file in files))
     if cameras.rig is not None:
@@ -133,7 +133,7 @@ _BASALT_LENSES = {"pinhole": "", "kb4": "k1 k2 k3 k4", "pinhole-radtan8": "k1 k2
 
 
 def basalt(data: Dict[str, Any], file: pathlib.Path) -> StereoRig:
-    from .ros_images import rotation_of
+    from ..bag.ros_images import rotation_of
     calibration = Values(data, file, "a calibration of Basalt")
     cameras, body_from = [], []
     for camera, pose in zip(data.get("intrinsics", [])[:2], data.get("T_imu_cam", [])[:2]):

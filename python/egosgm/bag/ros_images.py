@@ -9,9 +9,9 @@ from typing import Any, Dict, Optional, Sequence, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _egosgm
-from .depth import depth_sigma_from_disparity
-from .rectification import Rectification, StereoRig
+from .. import _egosgm
+from ..geometry.depth import depth_sigma_from_disparity
+from ..calibration.rectification import Rectification, StereoRig
 
 # Bytes between neighbouring pixels of an encoding, and where the brightness lies in them, or red, green and blue.
 _GREY8 = {"mono8": (1, 0), "8UC1": (1, 0), "yuv422": (2, 1), "uyvy": (2, 1), "yuv422_yuy2": (2, 0), "yuyv": (2, 0), "nv12": (1, 0),

@@ -10,9 +10,9 @@ import sys
 import threading
 from typing import Any, List, Optional, Sequence, Tuple
 
-from . import _egosgm
-from .arguments import Parser, counted, decimal, expect_new_folder, say
-from .calibrations import find, read_euroc_rig
+from .. import _egosgm
+from ..arguments import Parser, counted, decimal, expect_new_folder, say
+from .reader import find, read_euroc_rig
 from .raw_pairs import RawPair, open_pairs
 from .rectification import Rectification, StereoRig
 

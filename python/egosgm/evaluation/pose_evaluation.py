@@ -7,7 +7,7 @@ from typing import List
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import _egosgm
+from .. import _egosgm
 
 LENGTHS_M, FRAME_STEP = range(100, 801, 100), 10
 SHORT_LENGTHS_M, SHORT_FRAME_STEP = range(5, 51, 5), 1

@@ -6,7 +6,7 @@ from typing import Any, Dict, NamedTuple, Optional, Sequence, Union
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _egosgm
+from .. import _egosgm
 
 
 class PointCloud(NamedTuple):

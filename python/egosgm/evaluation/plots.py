@@ -7,8 +7,8 @@ from typing import Any, List, Sequence, Tuple
 
 import numpy as np
 
-from . import _egosgm
-from .arguments import expect_new_file
+from .. import _egosgm
+from ..arguments import expect_new_file
 from .pose_evaluation import evaluate_poses, inverse
 from .video_evaluation import DensityFigures
 

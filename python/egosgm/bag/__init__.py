@@ -13,9 +13,10 @@ from typing import Any, Collection, Deque, Iterator, List, Optional, Sequence, T
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _egosgm, calibrations
-from .bag_parts import Parts
-from .rectification import StereoRig
+from .. import _egosgm
+from ..calibration import reader as calibrations
+from .parts import Parts
+from ..calibration.rectification import StereoRig
 from .ros_images import BODY_FROM_OPTICAL, Cameras, are_raw, grey_of, is_set, needs, quaternion_of, rotation_of, stamp_ns
 
 _IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
