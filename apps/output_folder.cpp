@@ -17,6 +17,9 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
+/// Files of all frames, which a run that stops writes up to there.
+const std::set<std::string> kGrowing{"poses.txt", kRunObjects};
+
 constexpr std::size_t kMaxReportBytes = std::size_t{1} << 30;
 constexpr std::size_t kAnySize = std::numeric_limits<std::size_t>::max() - 1;
 
@@ -183,7 +186,7 @@ void OutputFolder::look() {
 /// A run that goes on loses no frame, and maps of two runs do not mix.
 void OutputFolder::expect_maps_of_this_run() const {
   std::set<std::string> files = planned_;
-  files.insert("poses.txt");
+  files.insert(kGrowing.begin(), kGrowing.end());
   for (const std::string& name : files) {
     if (!is_there(path_ / name) || is_regular(path_ / name)) continue;
     throw InvalidArgument(
@@ -214,7 +217,8 @@ fs::path OutputFolder::named_file(const std::string& option, const std::string& 
   const fs::path path = place_of_name(file);
   if (is_within(path_, path)) throw InvalidArgument(option + " " + file + ": is a folder: give the name of a file");
   const std::string name = path.lexically_relative(path_).string();
-  if (name == "report.json" || name == "poses.txt" || planned_.contains(name) || folders_of(planned_).contains(name)) {
+  if (name == "report.json" || kGrowing.contains(name) || planned_.contains(name) ||
+      folders_of(planned_).contains(name)) {
     throw InvalidArgument(option + " " + file + ": is what the run writes itself: give another name");
   }
   if (!named_.insert(path.string()).second) {
@@ -254,15 +258,15 @@ bool OutputFolder::is_to_write(const fs::path& file, std::string_view bytes) con
                     "another --out",
                     file.string()));
   }
-  if (!(planned_.contains(name) || name == "poses.txt") || !is_there(file)) return true;
+  if (!(planned_.contains(name) || kGrowing.contains(name)) || !is_there(file)) return true;
   const std::string earlier = is_regular(file) ? vision::read_file(file, kAnySize) : std::string();
   if (earlier == bytes) return false;
   if (earlier_.is_null() || !is_regular(file)) {
     throw IoError(file.string() + ": has come there while the run wrote, and stays: choose another --out");
   }
-  // A run that stopped wrote the poses up to there.
-  if (name == "poses.txt" && bytes.starts_with(earlier)) return true;
-  if (name == "poses.txt" && earlier.starts_with(bytes)) return false;
+  // A run that stopped wrote them up to there.
+  if (kGrowing.contains(name) && bytes.starts_with(earlier)) return true;
+  if (kGrowing.contains(name) && earlier.starts_with(bytes)) return false;
   throw InvalidArgument(fmt::format(
       "--resume: {} is not what this run makes of the frame, so it was changed, or what this run reads was: "
       "give another --out",

@@ -45,6 +45,17 @@ void expect_takeable(const RunArguments& arguments, const SequenceJob& job) {
     throw InvalidArgument(
         fmt::format("--write {}: a disparity is no depth without a calibration: give --calib FILE", kind));
   }
+  for (const char* kind : {"flow", "disp_1", "objects"}) {
+    if (!job.kinds.contains(kind)) continue;
+    if (!sequence.has_calibration) {
+      throw InvalidArgument(
+          fmt::format("--write {}: without a calibration there is no motion: give --calib FILE", kind));
+    }
+    if (!job.options.temporal) {
+      throw InvalidArgument(
+          fmt::format("--write {}: temporal=false predicts nothing that could move: leave it out", kind));
+    }
+  }
   if (job.kinds.contains("overview")) {
     for (const vision::StereoFrame& frame : sequence.frames) vision::expect_truth_of_size(frame, job.source->size());
   }

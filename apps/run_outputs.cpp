@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <sstream>
 #include <utility>
@@ -19,6 +20,7 @@
 #include "egosgm/vision/render.h"
 #include "host/frame_outputs.h"
 #include "vision/file_io.h"
+#include "vision/object_table.h"
 
 namespace egosgm::app {
 namespace {
@@ -27,6 +29,13 @@ namespace {
 const std::vector<std::string> kMade{
     "color", "interpolated", "interpolated_certain", "pfm", "overview", "cloud", "depth", "depth_m", "left"};
 
+/// What is made of a frame and the one after it: the last frame has none.
+const std::vector<std::string> kSceneFlow{"flow", "disp_1", "objects"};
+
+bool is_scene_flow(const std::string& kind) {
+  return std::find(kSceneFlow.begin(), kSceneFlow.end(), kind) != kSceneFlow.end();
+}
+
 /// All that `--write` takes.
 std::vector<std::string> kinds_to_write() {
   std::vector<std::string> kinds;
@@ -34,6 +43,7 @@ std::vector<std::string> kinds_to_write() {
     if (*text.written && text.output != Output::kDisparity) kinds.emplace_back(text.written);  // that is always written
   }
   kinds.insert(kinds.end(), kMade.begin(), kMade.end());
+  kinds.insert(kinds.end(), kSceneFlow.begin(), kSceneFlow.end());
   return kinds;
 }
 
@@ -43,7 +53,8 @@ bool fits_png(const PipelineOptions& options) {
 }
 
 const char* extension_of(const std::string& kind, const PipelineOptions& options) {
-  bool is_disparity = kind.starts_with("interpolated"), is_float = is_disparity || kind == "pfm" || kind == "depth_m";
+  bool is_disparity = kind.starts_with("interpolated") || kind == "disp_1",
+       is_float = is_disparity || kind == "pfm" || kind == "depth_m";
   for (const OutputText& text : output_texts()) {
     if (kind != text.written) continue;
     is_disparity = text.unit == std::string("px");
@@ -80,6 +91,11 @@ std::string write_list_help() {
          "  depth, depth_m depth in millimetres, 16-bit PNG, 0 where there is none or more than 65.535 m; in metres, "
          "PFM\n"
          "  left           the left images as they are matched, grey PNG; always of a bag\n"
+         "  flow, disp_1   optical flow to the next frame, KITTI's PNG, and the disparity there at this frame's "
+         "pixels, as "
+         "OUT/disparity\n"
+         "  objects        the id of the object that moves by itself, 8-bit PNG, and OUT/objects.csv with their "
+         "motions\n"
          "What the numbers of reason and the formats mean: docs/use/formats.md";
 }
 
@@ -108,7 +124,10 @@ std::vector<std::string> output_files(const std::set<std::string>& kinds, const 
                                       const PipelineOptions& options) {
   std::vector<std::string> files;
   for (const vision::StereoFrame& frame : sequence.frames) {
-    for (const std::string& kind : kinds) files.push_back(output_file(kind, frame.name, options));
+    for (const std::string& kind : kinds) {
+      if (is_scene_flow(kind) && &frame == &sequence.frames.back()) continue;
+      files.push_back(output_file(kind, frame.name, options));
+    }
     files.push_back(output_file("disparity", frame.name, options));
   }
   return files;
@@ -134,6 +153,11 @@ RunOutputs::RunOutputs(std::filesystem::path folder, std::set<std::string> kinds
   }
   if (wants("overview") || wants("cloud") || wants("interpolated_certain")) wanted.add(Output::kVariance);
   if (wants("overview")) wanted.add(Output::kSearchWidth);
+  if (std::any_of(kinds_.begin(), kinds_.end(), is_scene_flow)) {
+    wanted.add(Output::kDynamic);
+    tracker_.emplace(calibration);
+    objects_ = fmt::format("{},age,pixels,sx_m,sy_m,sz_m\n", vision::kObjectColumns);
+  }
   make_maps(wanted);
 }
 
@@ -146,7 +170,29 @@ void RunOutputs::make_maps(const Wanted& wanted) {
   });
 }
 
-WrittenFrame RunOutputs::write(const vision::StereoFrame& frame, const vision::Image& left) {
+void RunOutputs::write_scene_flow(const vision::StereoFrame& frame, const vision::Image& left,
+                                  const std::optional<Motion>& motion) {
+  tracker_->process(left, map(Output::kDisparity), map(Output::kDynamic), motion);
+  const std::string from = std::exchange(last_frame_, frame.name);
+  const std::optional<vision::SceneFlow> flow = tracker_->scene_flow();
+  if (!flow) return;
+  const auto file_of = [&](const char* kind) { return folder_ / output_file(kind, from, options_); };
+  if (wants("flow")) vision::write_flow_png(file_of("flow"), flow->flow);
+  if (wants("disp_1")) vision::write_disparity(file_of("disp_1"), flow->next_disparity);
+  if (!wants("objects")) return;
+  vision::write_png(file_of("objects"), flow->labels);
+  for (const vision::MovingObject& object : flow->moving) {
+    objects_ += vision::object_row(from, object, object.current_from_previous);
+    objects_ += fmt::format(",{},{}", object.age, object.pixels);
+    for (const double variance : object.velocity_covariance_m2.diagonal()) {
+      objects_ += fmt::format(",{:.6g}", std::sqrt(variance));
+    }
+    objects_ += '\n';
+  }
+}
+
+WrittenFrame RunOutputs::write(const vision::StereoFrame& frame, const vision::Image& left,
+                               const std::optional<Motion>& motion) {
   using Path = std::filesystem::path;
   WrittenFrame written;
   const vision::Image &disparity = map(Output::kDisparity), &variance = map(Output::kVariance);
@@ -193,6 +239,7 @@ WrittenFrame RunOutputs::write(const vision::StereoFrame& frame, const vision::I
       vision::write_png(file_of(text.written), values);
     }
   }
+  if (tracker_) write_scene_flow(frame, left, motion);
   // Last: a frame with it is complete.
   written.unstorable = vision::write_disparity(file_of("disparity"), disparity);
   return written;

@@ -12,6 +12,7 @@
 #include "apps/frame_sink.h"
 #include "egosgm/pipeline.h"
 #include "egosgm/vision/image.h"
+#include "egosgm/vision/moving_objects.h"
 #include "egosgm/vision/point_cloud.h"
 #include "host/frame_outputs.h"
 #include "vision/frame_panels.h"
@@ -54,11 +55,17 @@ class RunOutputs {
   void make_maps(const Wanted& wanted);
   ShownMaps shown() const { return {map(Output::kDisparity), map(Output::kVariance), map(Output::kReason)}; }
 
-  /// Writes the frame that the views hold; `left` is its left image.
-  WrittenFrame write(const vision::StereoFrame& frame, const vision::Image& left);
+  /// Writes the frame that the views hold, and the scene flow from the one before; `left` is its left image, `motion`
+  /// the camera's from the frame before.
+  WrittenFrame write(const vision::StereoFrame& frame, const vision::Image& left, const std::optional<Motion>& motion);
+
+  /// The rows of objects.csv so far, where objects are written.
+  std::optional<std::string> objects() const { return wants("objects") ? std::optional(objects_) : std::nullopt; }
 
  private:
   bool wants(const char* kind) const { return kinds_.contains(kind); }
+  void write_scene_flow(const vision::StereoFrame& frame, const vision::Image& left,
+                        const std::optional<Motion>& motion);
   const vision::Image& map(Output output) const { return maps_[static_cast<std::size_t>(output)]; }
 
   const std::filesystem::path folder_;
@@ -70,6 +77,8 @@ class RunOutputs {
   std::array<vision::Image, kOutputCount> maps_;  // empty where it is not wanted
   FrameOutputs outputs_;                          // views of them
   vision::FramePanels panels_;
+  std::optional<vision::ObjectTracker> tracker_;  // where scene flow is written
+  std::string last_frame_, objects_;
 };
 
 }  // namespace egosgm::app

@@ -172,7 +172,8 @@ class Run {
   void take(const vision::VideoFrame& made, Progress& progress) {
     const vision::StereoFrame& frame = made.pair.frame;
     const auto before_write = Clock::now();
-    const WrittenFrame written = has_folder() ? outputs_->write(frame, made.pair.images.left) : WrittenFrame();
+    const WrittenFrame written =
+        has_folder() ? outputs_->write(frame, made.pair.images.left, made.motion.motion) : WrittenFrame();
     if (sink_) sink_->take(made, outputs_->shown());
     if (written.cloud) add(*written.cloud);
     const HostTimes times{made.read_ms, ms_since(before_write), ms_since(last_written_)};
@@ -246,6 +247,9 @@ class Run {
     report_.set_doubt(doubt.empty() || of_poses.empty() ? doubt + of_poses : doubt + "; " + of_poses, notes_);
     if (has_folder() && sequence_.has_calibration && !poses_.empty())
       vision::write_poses(folder_.path() / "poses.txt", poses_);
+    if (const auto objects = outputs_->objects(); has_folder() && objects && !poses_.empty()) {
+      vision::write_file(folder_.path() / kRunObjects, *objects);
+    }
     write_report(finished, why_not);
     if (const std::optional<Trace> trace = std::exchange(trace_, std::nullopt)) write_trace(*trace);
     if (!finished) return;

@@ -19,6 +19,7 @@ namespace egosgm::app {
 
 /// The calibration's file in the folder of a run whose images came from no files.
 inline constexpr const char* kRunCalibration = "calibration.txt";
+inline constexpr const char* kRunObjects = "objects.csv";
 
 /// A sequence, how to match it, and where its results go.
 struct SequenceJob {

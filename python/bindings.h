@@ -25,6 +25,7 @@ void bind_errors(pybind11::module_& module);
 void bind_values(pybind11::module_& module);
 void bind_pipeline(pybind11::module_& module);
 void bind_odometry(pybind11::module_& module);
+void bind_moving_objects(pybind11::module_& module);
 void bind_examination(pybind11::module_& module);
 void bind_video(pybind11::module_& module);
 void bind_program(pybind11::module_& module);

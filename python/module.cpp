@@ -74,6 +74,7 @@ PYBIND11_MODULE(_egosgm, module) {
   bind_values(module);
   bind_pipeline(module);
   bind_odometry(module);
+  bind_moving_objects(module);
   bind_examination(module);
   bind_video(module);
   bind_program(module);

@@ -15,6 +15,7 @@
 #include "vision/file_io.h"
 #include "vision/frame_names.h"
 #include "vision/image_values.h"
+#include "vision/object_table.h"
 #include "vision/synthetic_render.h"
 #include "vision/synthetic_scene.h"
 
@@ -63,18 +64,6 @@ void write_frame(const SyntheticFrame& frame, const std::string& name, bool with
   if (!with_moving) return;
   write_png(truth / "left_moving" / name, frame.left_moving);
   write_png(truth / "right_moving" / name, frame.right_moving);
-}
-
-constexpr const char* kObjectColumns =
-    "frame,id,left,top,right,bottom,x_m,y_m,z_m,vx_m,vy_m,vz_m,m00,m01,m02,m03,m10,m11,m12,m13,m20,m21,m22,m23\n";
-
-std::string object_row(int frame, const SyntheticObject& object) {
-  std::string row =
-      text(frame, ",", object.id, ",", object.left, ",", object.top, ",", object.right, ",", object.bottom);
-  for (const double value : object.centre_m) row += text(",", value);
-  for (const double value : object.velocity_m) row += text(",", value);
-  for (int i = 0; i < 12; ++i) row += text(",", object.next_from_current(i / 4, i % 4));
-  return row + "\n";
 }
 
 }  // namespace
@@ -162,7 +151,7 @@ void write_sequence(const SyntheticOptions& options, const std::filesystem::path
   }
 
   std::vector<Eigen::Isometry3d> poses;
-  std::string times, objects = kObjectColumns;
+  std::string times, objects = std::string(kObjectColumns) + "\n";
   for (int k = 0; k < options.frames; ++k) {
     poses.push_back(sequence.world_from_camera(k));
     times += text(0.1 * k, "\n");
@@ -180,7 +169,9 @@ void write_sequence(const SyntheticOptions& options, const std::filesystem::path
         write_flow_png(truth / "flow" / name, next.flow);
         write_disparity_png(truth / "disp_1" / name, next.next_disparity);
         write_png(truth / "seen_next" / name, next.seen_next);
-        for (const SyntheticObject& object : next.moving) objects += object_row(k, object);
+        for (const SyntheticObject& object : next.moving) {
+          objects += object_row(std::to_string(k), object, object.next_from_current) + "\n";
+        }
       }
     }
     if (progress) progress(k + 1, options.frames);

@@ -29,6 +29,8 @@ class DriveFrame:
     odometry: Optional[_egosgm.OdometryResult]
     motion: Optional[_egosgm.Motion]  # from the frame before
     calibration: Optional[_egosgm.Calibration]
+    objects: Optional[_egosgm.LabelledObjects] = None  # where run() was asked for objects
+    scene_flow: Optional[_egosgm.SceneFlow] = None  # likewise: from the frame before to this one, None without a motion
 
     @property
     def disparity(self) -> Optional[NDArray[np.float32]]:
@@ -75,7 +77,7 @@ class Drive:
     def __init__(self, source: Union[str, "os.PathLike[str]", _egosgm.StereoSequence, Bag, Iterable[Tuple[NDArray[Any], NDArray[Any]]]],
                  calibration: "_egosgm.Calibration | str | os.PathLike[str] | None" = None, *, frames: str = "", motion: bool = True,
                  outputs: Union[str, Sequence[str]] = ("disparity", "variance"), odometry: Optional[Dict[str, Any]] = None, lag: int = 1,
-                 progress: Optional[bool] = None, **options: Any) -> None:
+                 progress: Optional[bool] = None, objects: bool = False, **options: Any) -> None:
         if isinstance(source, (str, os.PathLike)):
             source = _egosgm.open_folder(source, frames)
         elif frames:
@@ -110,6 +112,11 @@ class Drive:
         self._odometry_options = (odometry or {}) if motion and calibration is not None else None
         if odometry and self._odometry_options is None:
             raise _egosgm.InvalidArgument("odometry: has options, but without a calibration, or with motion=False, there is none: leave them out")
+        if objects and self._odometry_options is None:
+            raise _egosgm.InvalidArgument("objects=True: what moves by itself is told from the camera's motion: give a calibration, and leave motion=False out")
+        self._objects = bool(objects)
+        if self._objects:  # the tracker needs these maps
+            self._outputs = tuple(dict.fromkeys((*((outputs,) if isinstance(outputs, str) else outputs), "disparity", "dynamic")))
         self._begun = False
         # What is wrong with options is said at once, as far as the size is known.
         if self._odometry_options is not None:
@@ -173,6 +180,7 @@ class Drive:
             pipeline = pipeline or self._pipeline(*size)
             video = _egosgm._Video(pipeline, *size, self.calibration, self.sequence, self._outputs, self._lag, self._odometry_options is not None,
                                    **(self._odometry_options or {}))
+            tracker = _egosgm.ObjectTracker(self.calibration) if self._objects else None
             while True:
                 while video.wants_pair:
                     try:
@@ -189,7 +197,9 @@ class Drive:
                 if left_out:
                     self._tell(f"frame {name}: left out: {left_out}")
                     continue
-                yield DriveFrame(number, name, *images, maps, None if self._odometry_options is None else odometry, motion, self.calibration)
+                found_objects = tracker.process(images[0], maps.disparity, maps.dynamic, motion) if tracker else None
+                yield DriveFrame(number, name, *images, maps, None if self._odometry_options is None else odometry, motion, self.calibration,
+                                 found_objects, tracker.scene_flow() if tracker else None)
             if failure:
                 raise failure
             doubts = "; ".join(filter(None, (*video.doubts(), self._source.gaps.text() if isinstance(self._source, Bag) else "")))
@@ -219,7 +229,7 @@ def _bar(progress: Optional[bool]):
 def run(source: Union[str, "os.PathLike[str]", _egosgm.StereoSequence, Bag, Iterable[Tuple[NDArray[Any], NDArray[Any]]]],
         calibration: "_egosgm.Calibration | str | os.PathLike[str] | None" = None, *, frames: str = "", motion: bool = True,
         outputs: Union[str, Sequence[str]] = ("disparity", "variance"), odometry: Optional[Dict[str, Any]] = None, lag: int = 1,
-        progress: Optional[bool] = None, **options: Any) -> Drive:
+        progress: Optional[bool] = None, objects: bool = False, **options: Any) -> Drive:
     """Disparity and variance for each frame of a drive:
 
         for frame in egosgm.run("drive/"):
@@ -231,6 +241,7 @@ def run(source: Union[str, "os.PathLike[str]", _egosgm.StereoSequence, Bag, Iter
     frames: "7:10" of a folder. motion=False: no odometry, so nothing is predicted. outputs: names of maps, found in
     `frame.maps`. odometry: options of StereoOdometry. lag: 1, the device matches a frame while the next pair is asked for; 0, for a
     live camera: a frame comes before the next pair is asked for. progress: a bar by tqdm; None: where somebody looks.
+    objects=True: `frame.objects` has what moves by itself, and `frame.scene_flow` where the pixels of the frame before went.
     All else is for Pipeline: device, preset and its options.
     """
-    return Drive(source, calibration, frames=frames, motion=motion, outputs=outputs, odometry=odometry, lag=lag, progress=progress, **options)
+    return Drive(source, calibration, frames=frames, motion=motion, outputs=outputs, odometry=odometry, lag=lag, progress=progress, objects=objects, **options)

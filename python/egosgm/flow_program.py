@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compare scene flow with the true one, as KITTI 2015's development kit does: outliers of the disparity (D1), of the disparity in the next frame at this
-frame's pixels (D2), of the optical flow to the next frame (Fl), and of any of them (SF)."""
+frame's pixels (D2), of the optical flow to the next frame (Fl), and of any of them (SF). Where both sides label objects that move by themselves: which of
+them were found, and how far their motions are off."""
+import csv
 import pathlib
-from typing import Any, Dict, List, Sequence
+from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -15,7 +17,7 @@ from .video_program import read_flow
 _Path = pathlib.Path
 MEASURES = ("d1", "d2", "fl", "sf")
 BAD_SHARE = 0.05  # an outlier is off by more than BAD_PX, and by more than this share of the truth
-_FOLDERS = (("disp_0", "disparity", "left_disp_occ", "disp_occ_0"), ("disp_1", "disp_occ_1"), ("flow", "flow_occ"))  # of D1, D2, Fl: the first that is there
+_FOLDERS = (("disp_0", "interpolated", "disparity", "left_disp_occ", "disp_occ_0"), ("disp_1", "disp_occ_1"), ("flow", "flow_occ"))  # of D1, D2, Fl: the first that is there
 _MOVING = ("objects", "obj_map")
 
 
@@ -32,6 +34,95 @@ def count_outliers(estimates: Sequence[np.ndarray], truths: Sequence[np.ndarray]
     wrong, known, given = [*wrong, np.any(wrong, axis=0)], [*known, np.all(known, axis=0)], [*given, np.all(given, axis=0)]
     regions = {"all": True} if moving is None else {"all": True, "moving": moving, "static": ~moving}
     return {name: np.array([[np.count_nonzero(which & k & region) for which in (w, k, g)] for w, k, g in zip(wrong, known, given)]) for name, region in regions.items()}
+
+
+MIN_OBJECT_PIXELS = 150  # of a true object; smaller ones are not asked for
+MIN_OVERLAP = 0.4  # of an object that was found: intersection over union with the true one
+_Motions = Dict[Tuple[str, int], np.ndarray]
+
+
+def match_objects(estimate: np.ndarray, truth: np.ndarray) -> Tuple[Dict[int, int], List[int], List[int]]:
+    """Ids of true objects that were found, each with the estimated one that overlaps most; of those that were not; and of estimated objects that are false.
+    Maps of ids, H x W, 0 where nothing moves by itself. An estimated object is false where no true one has it and most of it stands."""
+    overlaps: Dict[int, Tuple[float, int]] = {}
+    areas = {int(i): np.count_nonzero(estimate == i) for i in np.unique(estimate) if i}
+    for true_id in (int(i) for i in np.unique(truth) if i):
+        region = truth == true_id
+        pixels = np.count_nonzero(region)
+        if pixels < MIN_OBJECT_PIXELS:
+            continue
+        common = {i: np.count_nonzero(region & (estimate == i)) for i in areas}
+        overlaps[true_id] = max(((common[i] / (pixels + areas[i] - common[i]), i) for i in areas), default=(0.0, 0))
+    found = {true_id: own for true_id, (overlap, own) in overlaps.items() if overlap >= MIN_OVERLAP}
+    false = [i for i in areas if i not in found.values() and np.count_nonzero((estimate == i) & (truth > 0)) < MIN_OVERLAP * areas[i]]
+    return found, [i for i in overlaps if i not in found], false
+
+
+def _frame_key(name: str) -> str:
+    return name.lstrip("0") or "0"
+
+
+def read_motions(folder: _Path) -> _Motions:
+    """The 4x4 motions to the next camera's frame, by frame and object, of a folder's objects.csv, or of motions.txt: rows of a frame, an id and 12 numbers."""
+    rows: List[List[str]] = []
+    if (folder / "objects.csv").is_file():
+        with open(folder / "objects.csv", newline="", encoding="utf-8") as table:
+            rows = [[row["frame"], row["id"], *(row[f"m{i}{j}"] for i in range(3) for j in range(4))] for row in csv.DictReader(table)]
+    elif (folder / "motions.txt").is_file():
+        rows = [line.split() for line in (folder / "motions.txt").read_text(encoding="utf-8").splitlines() if line.strip()]
+    try:
+        return {(_frame_key(row[0]), int(row[1])): np.vstack([np.array(row[2:], float).reshape(3, 4), [0, 0, 0, 1]]) for row in rows}
+    except ValueError as error:
+        raise _egosgm.InvalidArgument(f"{folder}: objects.csv or motions.txt is damaged: {error}; give it as `egosgm run --write objects` writes it") from None
+
+
+def motion_errors(estimate: np.ndarray, truth: np.ndarray, centre_m: np.ndarray) -> Tuple[float, float]:
+    """By how much a motion moves an object's centre elsewhere than the true one [m], and turns it otherwise [deg]."""
+    shift = (truth - estimate)[:3] @ np.append(centre_m, 1)
+    cosine = (np.trace(truth[:3, :3].T @ estimate[:3, :3]) - 1) / 2
+    return float(np.linalg.norm(shift)), float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
+
+
+class _Objects:
+    """Objects and their motions over the frames."""
+
+    def __init__(self, estimate: _Path, truth: _Path) -> None:
+        self.found = self.lost = self.false = 0
+        self._shifts: List[float] = []
+        self._turns: List[float] = []
+        self._estimate, self._truth = read_motions(estimate), read_motions(truth)
+        self._calibration: Optional[_egosgm.Calibration] = None
+        try:
+            self._calibration = _egosgm.open_folder(truth.parent if truth.name == "truth" else truth).calibration
+        except _egosgm.Error:
+            pass  # then nothing is said of motions
+
+    def add(self, name: str, estimate: np.ndarray, truth: np.ndarray, disparity: np.ndarray) -> None:
+        found, lost, false = match_objects(estimate, truth)
+        self.found, self.lost, self.false = self.found + len(found), self.lost + len(lost), self.false + len(false)
+        for true_id, own in found.items():
+            motions = self._estimate.get((_frame_key(name), own)), self._truth.get((_frame_key(name), true_id))
+            if self._calibration is None or motions[0] is None or motions[1] is None:
+                continue
+            c, (rows, columns) = self._calibration, np.nonzero((truth == true_id) & np.isfinite(disparity))
+            depth = c.fx * c.baseline_m / (disparity[rows, columns] + c.doffs_px)
+            centre = np.array([((columns - c.cx) / c.fx * depth).mean(), ((rows - c.cy) / c.fy * depth).mean(), depth.mean()])
+            shift, turn = motion_errors(motions[0], motions[1], centre)
+            self._shifts.append(shift)
+            self._turns.append(turn)
+
+    def figures(self) -> Dict[str, Any]:
+        figures: Dict[str, Any] = {"found": self.found, "lost": self.lost, "false": self.false}
+        if self._shifts:
+            figures.update(median_shift_error_m=float(np.median(self._shifts)), median_turn_error_deg=float(np.median(self._turns)))
+        return figures
+
+
+def _text_of_objects(figures: Dict[str, Any]) -> str:
+    text = f"objects: {figures['found']} of {figures['found'] + figures['lost']} found, {figures['false']} false"
+    if "median_shift_error_m" in figures:
+        text += f"; median errors of their motions: {figures['median_shift_error_m']:.3f} m, {figures['median_turn_error_deg']:.2f} degrees"
+    return text
 
 
 def _place(folder: _Path, names: Sequence[str], needed: bool = True) -> _Path:
@@ -79,22 +170,31 @@ def _work(arguments: Sequence[str]) -> str:
         notes.append(f"{counted(len(missing), 'truth file')} without an estimate, the first is {missing[0]}")
     total: Dict[str, np.ndarray] = {}
     over_frames = []
+    labels = _place(estimate, ("objects",), needed=False)
+    objects = _Objects(estimate, truth) if labels != _Path() and moving != _Path() else None
     for name, flow in pairs[2].items():
         if any(name not in of_kind for of_kind in pairs):
             raise _egosgm.InvalidArgument(f"{flow.estimate}: its frame has no disparity, or none in the next frame: give one of each")
         files = [of_kind[name] for of_kind in pairs]
         maps = [[reader(getattr(pair, side)) for pair, reader in zip(files, (_read, _read, read_flow))] for side in ("estimate", "truth")]
-        mask = None if moving == _Path() else _egosgm.read_grey(moving / flow.truth.with_suffix(".png").name) != 0
+        true_objects = None if moving == _Path() else _egosgm.read_grey(moving / flow.truth.with_suffix(".png").name)
+        mask = None if true_objects is None else true_objects != 0
         sizes = {array.shape[:2] for array in (*maps[0], *maps[1], *([] if mask is None else [mask]))}
         if len(sizes) > 1:
             raise _egosgm.InvalidArgument(f"{flow.estimate}: maps of this frame differ in size: {', '.join(f'{w}x{h}' for h, w in sorted(sizes))}; give maps of one size")
         counts = count_outliers(*maps, mask)
+        if objects and true_objects is not None:
+            own = _egosgm.read_grey(labels / flow.estimate.with_suffix(".png").name)
+            if own.shape != true_objects.shape:
+                raise _egosgm.InvalidArgument(f"{labels}: its map of {name} is of another size than the truth: give one of the same frames")
+            objects.add(name, own, true_objects, maps[1][0][..., 0])
         over_frames.append({"name": name, **_figures_of(counts)})
         total = {region: total.get(region, 0) + rows for region, rows in counts.items()}
     regions = _figures_of(total)
+    of_objects = {"objects": objects.figures()} if objects else {}
     if given.json:
-        return json_text({"frames": len(over_frames), "regions": regions, "over_frames": over_frames, **({"notes": notes} if notes else {})})
-    return _text_of(len(over_frames), regions, notes)
+        return json_text({"frames": len(over_frames), "regions": regions, **of_objects, "over_frames": over_frames, **({"notes": notes} if notes else {})})
+    return _text_of(len(over_frames), regions, [*map(_text_of_objects, of_objects.values()), *notes])
 
 
 def main(arguments: Sequence[str]) -> int:

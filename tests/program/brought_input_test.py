@@ -49,7 +49,7 @@ class TwoPictures(Brought):
 
     def test_what_needs_a_calibration_says_so(self):
         out = self.new_folder() / "out"
-        for kind in ("depth", "depth_m", "cloud"):
+        for kind in ("depth", "depth_m", "cloud", "flow", "disp_1", "objects"):
             self.assert_refused(["run", *self.pictures(), "--out", out, "--write", kind], f"--write {kind}", "--calib")
         self.assert_refused(["run", *self.pictures(), "--out", out, "--poses", self.street / "poses.txt"], "--poses", "--calib")
         self.assert_refused(["odometry", *self.pictures(), "--out", out], "--calib")

@@ -21,8 +21,39 @@ class Synth(ProgramTest):
         for file in ("calib.txt", "poses.txt", "times.txt", "truth/objects.csv"):
             self.assertTrue((street / file).read_text().strip(), file)
 
-        figures = json.loads(self.assert_works("eval-flow", street / "truth", street, "--json"))["regions"]["moving"]
+        result = json.loads(self.assert_works("eval-flow", street / "truth", street, "--json"))
+        self.assertEqual([result["objects"][name] for name in ("found", "lost", "false", "median_shift_error_m")], [1, 0, 0, 0])
+        self.assertAlmostEqual(result["objects"]["median_turn_error_deg"], 0, 3)
+        figures = result["regions"]["moving"]
         self.assertEqual([(figures[name]["outliers_percent"], figures[name]["density_percent"]) for name in ("d1", "d2", "fl", "sf")], [(0, 100)] * 4)
+
+    def test_objects_and_flow_of_a_run_are_those_of_the_street(self):
+        street, out = self.new_folder() / "street", self.new_folder() / "out"
+        self.assert_works("synth", "--out", street, "--frames", 5, "--width", 480, "--height", 180, "--seed", 3, "--moving-object", "--quiet")
+        run = ["run", street, "--out", out, "--poses", street / "poses.txt", "--disparities", 64, "--write", "interpolated,flow,disp_1,objects", "--quiet"]
+        self.assert_works(*run)
+        for folder, frames in (("flow", 4), ("disp_1", 4), ("objects", 4), ("disparity", 5)):
+            self.assertEqual([f.name for f in sorted((out / folder).iterdir())], [f"{i:06d}.png" for i in range(frames)], folder)
+        rows = [line.split(",") for line in (out / "objects.csv").read_text().splitlines()]
+        self.assertEqual(rows[0][:2] + rows[0][-5:], ["frame", "id", "age", "pixels", "sx_m", "sy_m", "sz_m"])
+        self.assertEqual([row[-5] for row in rows[1:] if row[1] == rows[1][1]], ["1", "2", "3", "4"])  # one object stays itself
+        result = json.loads(self.assert_works("eval-flow", out, street, "--json"))
+        self.assertLess(result["regions"]["all"]["sf"]["outliers_percent"], 8)
+        self.assertLess(result["regions"]["moving"]["fl"]["outliers_percent"], 40)  # 100 by the camera's motion alone
+        self.assertGreaterEqual(result["objects"]["found"], 4)
+        self.assertLess(result["objects"]["median_shift_error_m"], 0.08)  # of 1 m a frame
+        self.assertLess(result["objects"]["median_turn_error_deg"], 2)
+
+        # A run that goes on makes them again.
+        kept = {name: (out / name).read_bytes() for name in ("objects.csv", "flow/000002.png")}
+        (out / "flow/000002.png").unlink()
+        (out / "objects.csv").write_bytes(kept["objects.csv"][:len(kept["objects.csv"]) // 2])
+        self.assert_works(*run, "--resume")
+        for name, before in kept.items():
+            self.assertEqual((out / name).read_bytes(), before, name)
+        done = egosgm("run", street, "--out", self.new_folder() / "new", "--temporal", "off", "--write", "flow")
+        self.assertEqual(done.returncode, 2, done.stderr)
+        self.assertIn("--write flow: temporal=false", done.stderr)
 
     def test_a_plain_street_has_a_sky(self):
         plain = self.new_folder() / "plain"

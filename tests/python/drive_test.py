@@ -54,6 +54,32 @@ def test_a_folder_and_its_pairs_give_the_maps_of_the_pipeline(street_folder, sha
         np.testing.assert_array_equal(a.disparity, c)
 
 
+def test_objects_are_those_of_a_tracker(tmp_path):
+    street = egosgm.SyntheticSequence(width=480, height=180, frames=3, seed=3, moving_object=True, supersampling=1)
+    pairs = [(frame.left, frame.right) for frame in map(street.render, range(3))]
+    found = list(egosgm.run(pairs, street.calibration, objects=True, outputs="variance", disparities=64, paths=4))
+    tracker = egosgm.ObjectTracker(street.calibration)
+    for frame in found:
+        own = tracker.process(frame.left, frame.disparity, frame.maps.dynamic, frame.motion)
+        np.testing.assert_array_equal(frame.objects.labels, own.labels)
+        assert [o.id for o in frame.objects.moving] == [o.id for o in own.moving] and frame.variance is not None
+        flow = tracker.scene_flow()
+        assert (frame.scene_flow is None) == (flow is None) == (frame is found[0])
+        if flow is not None:
+            np.testing.assert_array_equal(frame.scene_flow.flow, flow.flow)
+            assert flow.flow.shape == (180, 480, 2) and flow.next_disparity.shape == flow.labels.shape == flow.disparity.shape == (180, 480)
+            assert flow.camera.current_from_previous.shape == (4, 4)
+    (bus,) = [o for o in found[2].objects.moving if o.age == 2]
+    assert bus.box[0] < bus.box[2] and bus.pixels > 500 and bus.current_from_previous.shape == (4, 4) and "age 2" in repr(bus)
+    assert np.linalg.norm(bus.velocity_m) == pytest.approx(1, abs=0.1) and bus.centre_m[2] > 5 and min(bus.velocity_sigma_m) > 0
+    assert found[2].scene_flow.moving[0].id == bus.id
+    for wrong in ({"motion": False}, {"calibration": None}):
+        with pytest.raises(egosgm.InvalidArgument, match="objects=True"):
+            egosgm.run(pairs, **{"calibration": street.calibration, **wrong}, objects=True)
+    with pytest.raises(egosgm.InvalidArgument, match="do not belong together"):
+        tracker.process(found[0].left, found[0].disparity[1:], found[0].maps.dynamic, None)
+
+
 def test_a_calibration_of_images_of_another_size_is_refused(street_folder, tmp_path):
     camera = dict(intrinsics=[185.6, 185.6, 159.5, 43.7], resolution=[2 * WIDTH, 2 * HEIGHT])
     shift = [[1, 0, 0, -0.54], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]

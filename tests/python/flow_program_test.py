@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import egosgm
-from egosgm.flow_program import _work, count_outliers
+from egosgm.flow_program import _work, count_outliers, match_objects, motion_errors, read_motions
 
 NO = math.nan
 
@@ -74,3 +74,39 @@ def test_what_cannot_be_compared_is_named(tmp_path):
     (small / "disp_1").rmdir()
     with pytest.raises(egosgm.InvalidArgument, match="small: has no folder disp_1 or disp_occ_1"):
         _work([str(small), str(truth)])
+
+
+def test_objects_are_found_lost_or_false_by_their_overlap():
+    truth, own = np.zeros((2, 40, 40), np.uint8)
+    truth[0:10, 0:20] = 1  # 200 px: own 7 has half of it
+    truth[20:30, 0:20] = 2  # nobody has it: own 9 has a quarter
+    truth[0:10, 30:39] = 3  # 90 px: too small to be asked for
+    own[0:10, 0:10] = 7
+    own[20:25, 0:10] = 9
+    own[30:40, 20:40] = 8  # stands
+    own[0:10, 30:39] = 4  # most of it moves
+    assert match_objects(own, truth) == ({1: 7}, [2], [8])
+    assert match_objects(np.zeros_like(own), truth) == ({}, [1, 2], [])
+    assert match_objects(own, np.zeros_like(truth)) == ({}, [], [4, 7, 8, 9])
+
+
+def test_motion_errors_are_those_of_the_centre():
+    turned, true = np.eye(4), np.eye(4)
+    turned[:2, :2] = [[0.6, -0.8], [0.8, 0.6]]
+    true[:3, 3] = 0.5, 0, 0
+    shift, turn = motion_errors(turned, true, np.array([1.0, 0, 2]))
+    assert shift == pytest.approx(math.hypot(1.5 - 0.6, 0.8)) and turn == pytest.approx(math.degrees(math.acos(0.6)))
+
+
+def test_motions_come_from_a_table_or_rows(tmp_path):
+    names = ",".join(f"m{i}{j}" for i in range(3) for j in range(4))
+    (tmp_path / "objects.csv").write_text(f"frame,id,{names},age\n000010,3,1,0,0,5,0,1,0,6,0,0,1,7,2\n")
+    (key, motion), = read_motions(tmp_path).items()
+    assert key == ("10", 3) and motion[:, 3].tolist() == [5, 6, 7, 1]
+    (tmp_path / "objects.csv").rename(tmp_path / "old")
+    assert read_motions(tmp_path) == {}
+    (tmp_path / "motions.txt").write_text("10 3 1 0 0 5 0 1 0 6 0 0 1 7\n\n")
+    assert list(read_motions(tmp_path)) == [("10", 3)]
+    (tmp_path / "motions.txt").write_text("10 3 1 0\n")
+    with pytest.raises(egosgm.InvalidArgument, match="is damaged"):
+        read_motions(tmp_path)

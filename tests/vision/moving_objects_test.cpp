@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "egosgm/vision/moving_objects.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "egosgm/error.h"
+#include "egosgm/vision/synthetic.h"
+
+namespace egosgm::vision {
+namespace {
+
+constexpr int kFirst = 3, kFrames = 4;  // frames in which the bus ahead is seen whole
+
+const SyntheticSequence& street() {
+  static const SyntheticSequence sequence([] {
+    SyntheticOptions options;
+    options.frames = kFirst + kFrames + 1;
+    options.width = 480;
+    options.height = 180;
+    options.seed = 3;
+    options.moving_object = true;
+    options.noise_grey = 0.5;
+    options.supersampling = 2;
+    return options;
+  }());
+  return sequence;
+}
+
+/// The object of the truth that has the most pixels, and they.
+struct Truth {
+  SyntheticObject object;
+  Image labels;
+};
+
+Truth largest(int frame) {
+  SyntheticSceneFlow flow = street().scene_flow(frame);
+  const auto most = std::max_element(flow.moving.begin(), flow.moving.end(), [&](const auto& a, const auto& b) {
+    const auto area = [](const SyntheticObject& o) { return (o.right - o.left) * (o.bottom - o.top); };
+    return area(a) < area(b);
+  });
+  return {*most, flow.objects};
+}
+
+LabelledObjects process(ObjectTracker& tracker, int frame, bool has_motion = true) {
+  const SyntheticFrame images = street().render(frame);
+  const std::optional<Motion> motion = has_motion ? std::optional(street().motion(frame)) : std::nullopt;
+  return tracker.process(images.left, images.left_disparity, images.left_moving, motion);
+}
+
+const MovingObject* found_at(const LabelledObjects& found, const Truth& truth) {
+  for (const MovingObject& object : found.moving) {
+    int common = 0, either = 0;
+    for (int y = 0; y < truth.labels.rows; ++y) {
+      for (int x = 0; x < truth.labels.cols; ++x) {
+        const bool is_true = truth.labels.at<std::uint8_t>(y, x) == truth.object.id;
+        const bool is_own = found.labels.at<std::uint8_t>(y, x) == object.id;
+        common += is_true && is_own;
+        either += is_true || is_own;
+      }
+    }
+    if (common > 0.7 * either) return &object;
+  }
+  return nullptr;
+}
+
+bool is_empty(const Image& labels) {
+  for (int y = 0; y < labels.rows; ++y) {
+    if (std::any_of(labels.row(y), labels.row(y) + labels.cols, [](auto label) { return label != 0; })) return false;
+  }
+  return true;
+}
+
+TEST(MovingObjects, VehicleHasItsMotionInEachFrame) {
+  ObjectTracker tracker(street().calibration());
+  EXPECT_TRUE(process(tracker, kFirst, false).moving.empty());
+  int id = 0;
+  for (int k = kFirst + 1; k < kFirst + kFrames; ++k) {
+    const LabelledObjects found = process(tracker, k);
+    const Truth truth = largest(k), before = largest(k - 1);
+    const MovingObject* object = found_at(found, truth);
+    ASSERT_TRUE(object) << k;
+    EXPECT_EQ(object->age, k - kFirst);
+    EXPECT_EQ(object->id, id ? id : object->id);
+    id = object->id;
+    const Eigen::Isometry3d& motion = before.object.next_from_current;
+    const Eigen::Vector3d centre = before.object.centre_m;
+    EXPECT_LT((motion * centre - object->current_from_previous * centre).norm(), 0.05) << k;
+    EXPECT_LT(Eigen::AngleAxisd(motion.linear().transpose() * object->current_from_previous.linear()).angle(), 0.03);
+    // The truth's centre is that of the whole body.
+    EXPECT_LT((object->centre_m - truth.object.centre_m).norm(), 1.5);
+    EXPECT_LT((object->velocity_m - truth.object.velocity_m).norm(), 0.08 * truth.object.velocity_m.norm() + 0.03);
+    const Eigen::Vector3d sigma = object->velocity_covariance_m2.diagonal().cwiseSqrt();
+    EXPECT_GT(sigma.minCoeff(), 1e-4);
+    EXPECT_LT(sigma.maxCoeff(), 0.1);
+    EXPECT_LE(std::abs(object->left - truth.object.left), 12);
+    EXPECT_LE(std::abs(object->bottom - truth.object.bottom), 12);
+  }
+}
+
+TEST(MovingObjects, SceneFlowIsThatOfTheEarlierFrame) {
+  ObjectTracker tracker(street().calibration());
+  process(tracker, kFirst, false);
+  EXPECT_FALSE(tracker.scene_flow());
+  process(tracker, kFirst + 1);
+  const std::optional<SceneFlow> flow = tracker.scene_flow();
+  ASSERT_TRUE(flow);
+  const SyntheticSceneFlow truth = street().scene_flow(kFirst);
+  const Truth vehicle = largest(kFirst);
+  int asked = 0, right = 0, still = 0, still_right = 0;
+  for (int y = 0; y < truth.flow.rows; ++y) {
+    for (int x = 0; x < truth.flow.cols; ++x) {
+      const float *own = flow->flow.row<float>(y) + 2 * x, *exact = truth.flow.row<float>(y) + 2 * x;
+      if (std::isnan(exact[0]) || !truth.seen_next.at<std::uint8_t>(y, x)) continue;
+      const bool is_right = std::hypot(own[0] - exact[0], own[1] - exact[1]) < 1 &&
+                            std::abs(flow->next_disparity.at<float>(y, x) - truth.next_disparity.at<float>(y, x)) < 1;
+      const int label = truth.objects.at<std::uint8_t>(y, x);
+      asked += label == vehicle.object.id;
+      right += label == vehicle.object.id && is_right;
+      still += label == 0;
+      still_right += label == 0 && is_right;
+    }
+  }
+  EXPECT_GT(right, 0.9 * asked);
+  EXPECT_GT(still_right, 0.97 * still);
+  const LabelledObjects earlier{flow->moving, flow->labels};
+  const MovingObject* object = found_at(earlier, vehicle);
+  ASSERT_TRUE(object);
+  EXPECT_LT((object->velocity_m - vehicle.object.velocity_m).norm(), 0.08 * vehicle.object.velocity_m.norm() + 0.03);
+  EXPECT_LE(std::abs(object->left - vehicle.object.left), 12);
+  const Eigen::Vector3d seen_later = object->current_from_previous * object->centre_m;
+  const Eigen::Isometry3d back = street().motion(kFirst + 1).current_from_previous.inverse();
+  EXPECT_LT((object->velocity_m - (back * seen_later - object->centre_m)).norm(), 1e-9);
+  EXPECT_TRUE(flow->camera.current_from_previous.isApprox(street().motion(kFirst + 1).current_from_previous));
+}
+
+TEST(MovingObjects, WhatStandsIsNoObject) {
+  ObjectTracker tracker(street().calibration());
+  const Image marks(street().render(0).left.size(), kU8, 255);
+  for (int k = kFirst; k < kFirst + 3; ++k) {
+    const SyntheticFrame images = street().render(k);
+    Image marked = marks.clone();
+    for (int y = 0; y < marked.rows; ++y) {
+      for (int x = 0; x < marked.cols; ++x) {
+        // Blocks of what stands: the mask is wrong there.
+        const bool is_block = x / 40 % 2 == 0 && y / 40 % 2 == 0;
+        if (!is_block || images.left_moving.at<std::uint8_t>(y, x)) marked.at<std::uint8_t>(y, x) = 0;
+      }
+    }
+    const LabelledObjects found = tracker.process(images.left, images.left_disparity, marked, street().motion(k));
+    int labelled = 0;
+    for (int y = 0; y < marked.rows; ++y) {
+      for (int x = 0; x < marked.cols; ++x) {
+        labelled += found.labels.at<std::uint8_t>(y, x) && !images.left_moving.at<std::uint8_t>(y, x);
+      }
+    }
+    EXPECT_LT(labelled, 0.005 * static_cast<double>(marked.pixels())) << k;
+  }
+}
+
+TEST(MovingObjects, NoMarksOrNoMotionNoObject) {
+  ObjectTracker tracker(street().calibration());
+  process(tracker, kFirst, false);
+  EXPECT_FALSE(process(tracker, kFirst + 1).moving.empty());
+  const LabelledObjects without = process(tracker, kFirst + 2, false);
+  EXPECT_TRUE(without.moving.empty());
+  EXPECT_TRUE(is_empty(without.labels));
+  EXPECT_FALSE(tracker.scene_flow());
+  const LabelledObjects again = process(tracker, kFirst + 3);
+  ASSERT_FALSE(again.moving.empty());
+  EXPECT_EQ(again.moving[0].age, 1);
+
+  ObjectTracker unmarked(street().calibration());
+  for (int k = kFirst; k < kFirst + 2; ++k) {
+    const SyntheticFrame images = street().render(k);
+    const Image none(images.left.size(), kU8, 0);
+    EXPECT_TRUE(unmarked.process(images.left, images.left_disparity, none, street().motion(k)).moving.empty());
+  }
+  ASSERT_TRUE(unmarked.scene_flow());
+  EXPECT_TRUE(is_empty(unmarked.scene_flow()->labels));
+}
+
+TEST(MovingObjects, ImagesOf16BitsAndMapsWithoutValues) {
+  ObjectTracker tracker(street().calibration()), of_8_bits(street().calibration());
+  for (int k = kFirst; k < kFirst + 2; ++k) {
+    const SyntheticFrame images = street().render(k);
+    Image wide(images.left.size(), kU16);
+    for (int y = 0; y < wide.rows; ++y) {
+      for (int x = 0; x < wide.cols; ++x) {
+        wide.at<std::uint16_t>(y, x) = static_cast<std::uint16_t>(256 * images.left.at<std::uint8_t>(y, x));
+      }
+    }
+    const LabelledObjects found = tracker.process(wide, images.left_disparity, images.left_moving, street().motion(k));
+    const LabelledObjects expected =
+        of_8_bits.process(images.left, images.left_disparity, images.left_moving, street().motion(k));
+    EXPECT_EQ(found.moving.empty(), k == kFirst);
+    for (int y = 0; y < wide.rows; ++y) {
+      EXPECT_TRUE(std::equal(found.labels.row(y), found.labels.row(y) + wide.cols, expected.labels.row(y))) << y;
+    }
+  }
+  const Image black(tracker
+                        .process(Image(180, 480, kU8, 0), Image(180, 480, kF32, kInvalidDisparity),
+                                 Image(180, 480, kU8, 255), Motion())
+                        .labels);
+  EXPECT_TRUE(is_empty(black));
+}
+
+TEST(MovingObjects, RefusalsLeaveTheState) {
+  EXPECT_THROW(ObjectTracker(Calibration{}), InvalidArgument);
+  ObjectTracker tracker(street().calibration());
+  process(tracker, kFirst, false);
+  const SyntheticFrame images = street().render(kFirst + 1);
+  const Motion motion = street().motion(kFirst + 1);
+  const Image small(10, 10, kU8, 0), small_map(10, 10, kF32, 1);
+  EXPECT_THROW(tracker.process(images.left, images.left_disparity, small, motion), InvalidArgument);
+  EXPECT_THROW(tracker.process(images.left, images.left_moving, images.left_moving, motion), InvalidArgument);
+  EXPECT_THROW(tracker.process(images.left, images.left_disparity, images.left_disparity, motion), InvalidArgument);
+  EXPECT_THROW(tracker.process(images.left_disparity, images.left_disparity, images.left_moving, motion),
+               InvalidArgument);
+  EXPECT_THROW(tracker.process(small, small_map, small, motion), InvalidArgument);
+  EXPECT_THROW(tracker.process(Image(), Image(), Image(), motion), InvalidArgument);
+  Motion none;
+  none.current_from_previous.linear() *= 2;
+  EXPECT_THROW(tracker.process(images.left, images.left_disparity, images.left_moving, none), InvalidArgument);
+  EXPECT_TRUE(found_at(process(tracker, kFirst + 1), largest(kFirst + 1)));
+}
+
+}  // namespace
+}  // namespace egosgm::vision
