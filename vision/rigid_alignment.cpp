@@ -219,7 +219,7 @@ Eigen::Isometry3d best_shift(const Calibration& calibration, const AlignedView& 
     float u, v, grey;
   };
   std::vector<Place> places;
-  const std::size_t step = std::max<std::size_t>(1, points.size() / 200);
+  const std::size_t step = std::max<std::size_t>(1, points.size() / 100);
   for (std::size_t i = 0; i < points.size(); i += step) {
     const Eigen::Vector3d moved = camera * points[i].point_m;
     if (!(moved.z() > odometry::kMinDepth_m)) continue;
