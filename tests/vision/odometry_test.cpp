@@ -236,6 +236,18 @@ TEST(StereoOdometry, RotationOfAnImuGuidesWhereTheSearchIsNarrow) {
   }
 }
 
+/// The few features of the rough motion have fewer inliers than all features need; those of all of them have enough.
+TEST(StereoOdometry, FewRoughInliersDoWhereMostOfAllAgree) {
+  const RenderedVideo& drive = turning_drive();
+  const int min_inliers = 120;  // 87 matches are rough ones
+  StereoOdometry odometry(drive.sequence.calibration(), {.min_inliers = min_inliers});
+  process(odometry, drive.frames[4]);
+  const OdometryResult result = process(odometry, drive.frames[5]);
+  ASSERT_TRUE(result.motion) << result.reason;
+  EXPECT_GT(result.inliers, min_inliers);
+  expect_motion(result, drive.sequence.motion(5).current_from_previous, {0.03, 0.1}, "with few rough inliers");
+}
+
 /// A fifth of a millimetre a frame: below what one frame can tell, and yet not lost.
 TEST(StereoOdometry, CreepingIsNotTakenForStandstill) {
   const SyntheticSequence sequence(
