@@ -50,7 +50,7 @@ struct Result {
   std::vector<Row> rows;
   std::vector<DisparityMetrics> each;  // of the rows
   DisparityCounts all;
-  std::vector<std::string> doubts;  // what speaks against the estimates that were read
+  std::vector<std::string> warnings;  // what speaks against the estimates that were read
 
   void add(const DisparityCounts& counts) {
     each.push_back(vision::metrics_of(counts));
@@ -98,7 +98,7 @@ Result measure(const vision::EvaluationPairs& found, const EvalArguments& argume
     result.add(result.rows.back().counts);
     progress.done(pair.name);
   }
-  result.doubts = estimates.doubts(arguments.scale, arguments.truth_scale);
+  result.warnings = estimates.warnings(arguments.scale, arguments.truth_scale);
   return result;
 }
 
@@ -139,7 +139,7 @@ Json json_of(const vision::EvaluationPairs& found, const Result& result) {
     json["pairs"].push_back(std::move(entry));
   }
   for (const auto& file : found.without_estimate) json["without_estimate"].push_back(file.string());
-  if (!result.doubts.empty()) json["doubts"] = result.doubts;
+  if (!result.warnings.empty()) json["warnings"] = result.warnings;
   return json;
 }
 
@@ -227,8 +227,8 @@ int merge(const EvalArguments& arguments) {
       }
       result.add(counts);
     }
-    for (const Json& doubt : report.value("doubts", Json::array())) {
-      if (doubt.is_string()) result.doubts.push_back(file + ": " + doubt.get<std::string>());
+    for (const Json& warning : report.value("warnings", Json::array())) {
+      if (warning.is_string()) result.warnings.push_back(file + ": " + warning.get<std::string>());
     }
   }
   if (arguments.json) {
@@ -236,12 +236,12 @@ int merge(const EvalArguments& arguments) {
               {"pairs", result.each.size()},
               {"pooled", app::json_of(result.pooled())},
               {"mean", app::json_of(result.mean())}};
-    if (!result.doubts.empty()) json["doubts"] = result.doubts;
+    if (!result.warnings.empty()) json["warnings"] = result.warnings;
     fmt::print("{}\n", dumped(json, 2));
     return kOk;
   }
   print_errors(result);
-  for (const std::string& doubt : result.doubts) fmt::print("{}\n", doubt);
+  for (const std::string& warning : result.warnings) fmt::print("{}\n", warning);
   return kOk;
 }
 
@@ -257,7 +257,7 @@ int evaluate(EvalArguments arguments) {
   }
   print_errors(result);
   print_pairing(found);
-  for (const std::string& doubt : result.doubts) fmt::print("{}\n", doubt);
+  for (const std::string& warning : result.warnings) fmt::print("{}\n", warning);
   return kOk;
 }
 

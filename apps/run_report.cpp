@@ -152,8 +152,8 @@ void RunReport::leave_out(const vision::StereoFrame& frame, const std::string& w
   json_["left_out"].push_back({{"frame", frame.number}, {"name", frame.name}, {"why", why}});
 }
 
-void RunReport::set_doubt(const std::string& doubt, const std::vector<std::string>& notes) {
-  if (!doubt.empty()) json_["doubt"] = doubt;
+void RunReport::set_warning(const std::string& warning, const std::vector<std::string>& notes) {
+  if (!warning.empty()) json_["warning"] = warning;
   if (!notes.empty()) json_["notes"] = notes;
 }
 

@@ -47,8 +47,8 @@ class RunReport {
 
   /// A pair that could not be read.
   void leave_out(const vision::StereoFrame& frame, const std::string& why);
-  /// Records what speaks against the input (see Doubt), and unusual things about its frames.
-  void set_doubt(const std::string& doubt, const std::vector<std::string>& notes);
+  /// Records what speaks against the input (see InputCheck), and unusual things about its frames.
+  void set_warning(const std::string& warning, const std::vector<std::string>& notes);
 
   /// `finished`: whether all frames ran; else `why_not` says what stopped them. Throws IoError.
   void write(const std::filesystem::path& file, bool finished, const std::string& why_not = {});

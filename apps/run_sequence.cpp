@@ -237,14 +237,14 @@ class Run {
 
   void finish(bool finished, const std::string& why_not) {
     if (sink_) sink_->end(finished);
-    const std::string doubt = video_.doubt(), of_poses = video_.doubt_of_poses();
+    const std::string warning = video_.warning(), of_poses = video_.warning_of_poses();
     const std::size_t told = notes_.size();
     if (repeated_ > 0) {
       notes_.push_back(fmt::format("{} the pictures of the frame before: the camera is taken to stand there",
                                    repeated_ == 1 ? "1 frame repeats" : counted(repeated_, "frame") + " repeat"));
     }
     for (std::string& of_feed : source_.notes()) notes_.push_back(std::move(of_feed));
-    report_.set_doubt(doubt.empty() || of_poses.empty() ? doubt + of_poses : doubt + "; " + of_poses, notes_);
+    report_.set_warning(warning.empty() || of_poses.empty() ? warning + of_poses : warning + "; " + of_poses, notes_);
     if (has_folder() && sequence_.has_calibration && !poses_.empty())
       vision::write_poses(folder_.path() / "poses.txt", poses_);
     if (const auto objects = outputs_->objects(); has_folder() && objects && !poses_.empty()) {
@@ -267,7 +267,7 @@ class Run {
     if (clouds_) fmt::print("{}\n", text_of(*clouds_, cloud_options_));
     for (std::size_t i = told; i < notes_.size(); ++i) fmt::print("{}\n", notes_[i]);
     if (!of_poses.empty()) fmt::print("{}\n", of_poses);
-    if (!doubt.empty()) fmt::print("{}: `egosgm doctor {}` tells why\n", doubt, input_);
+    if (!warning.empty()) fmt::print("{}: `egosgm doctor {}` tells why\n", warning, input_);
   }
 
   void write_trace(const Trace& trace) {

@@ -87,7 +87,7 @@ struct KalmanUpdateOptions {
   float min_variance_px2 = 0.1f;
 };
 struct EvidenceOptions {
-  bool enabled = true;  // what no evidence says is there dies, and what is not confirmed is not given out
+  bool enabled = true;  // what no evidence says is there dies, and what is not confirmed is not published
 };
 struct OutputVarianceOptions {
   bool enabled = true;  // false: the filter's variance as it is, which knows of no wrong surface

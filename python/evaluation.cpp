@@ -126,11 +126,11 @@ void bind_estimates(py::module_& module) {
           },
           py::arg("estimate"), py::arg("truth"))
       .def(
-          "doubts",
+          "warnings",
           [](const EstimateReader& reader, double scale, double truth_scale) {
-            py::list doubts;
-            for (const std::string& doubt : reader.doubts(scale, truth_scale)) doubts.append(text_of(doubt));
-            return doubts;
+            py::list warnings;
+            for (const std::string& warning : reader.warnings(scale, truth_scale)) warnings.append(text_of(warning));
+            return warnings;
           },
           py::arg("scale"), py::arg("truth_scale"));
   module.def(

@@ -5,14 +5,14 @@
 #include "python/arrays.h"
 #include "python/bindings.h"
 #include "vision/coarse_map.h"
-#include "vision/doubt.h"
 #include "vision/grey_bytes.h"
+#include "vision/input_check.h"
 #include "vision/mosaic.h"
 
 namespace egosgm::python {
 namespace {
 
-using vision::Doubt;
+using vision::InputCheck;
 
 /// Names with a line before them: the package's own.
 void bind_images(py::module_& module) {
@@ -49,24 +49,25 @@ void bind_images(py::module_& module) {
       py::arg("disparities"), py::arg("min_disparity"));
 }
 
-void bind_doubts(py::module_& module) {
-  py::class_<Doubt>(module, "_Doubt")
+void bind_input_check(py::module_& module) {
+  py::class_<InputCheck>(module, "_InputCheck")
       .def(py::init([](const std::optional<Calibration>& calibration, int min_disparity, int disparities) {
              PipelineOptions options;
              options.min_disparity = min_disparity;
              options.disparities = disparities;
-             return Doubt(calibration, options);
+             return InputCheck(calibration, options);
            }),
            py::arg("calibration"), py::arg("min_disparity"), py::arg("disparities"))
       .def(
           "add",
-          [](Doubt& self, const py::object& left, const py::object& right, const FrameReport& report, bool has_motion) {
+          [](InputCheck& self, const py::object& left, const py::object& right, const FrameReport& report,
+             bool has_motion) {
             const vision::Image left_image = mat_of(left, "left"), right_image = mat_of(right, "right");
             const py::gil_scoped_release other_threads_run;
             self.add(left_image, right_image, report, has_motion);
           },
           py::arg("left"), py::arg("right"), py::arg("report"), py::arg("has_motion"))
-      .def("text", &Doubt::text);
+      .def("text", &InputCheck::text);
   py::class_<vision::Suspicion>(module, "_Suspicion")
       .def_readonly("what", &vision::Suspicion::what)
       .def_readonly("remedy", &vision::Suspicion::remedy)
@@ -81,7 +82,7 @@ void bind_doubts(py::module_& module) {
 
 void bind_examination(py::module_& module) {
   bind_images(module);
-  bind_doubts(module);
+  bind_input_check(module);
 }
 
 }  // namespace egosgm::python

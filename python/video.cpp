@@ -83,7 +83,7 @@ class Video {
                           made->motion.odometry, made->motion.motion);
   }
 
-  py::tuple doubts() const { return py::make_tuple(text_of(video_->doubt()), text_of(video_->doubt_of_poses())); }
+  py::tuple warnings() const { return py::make_tuple(text_of(video_->warning()), text_of(video_->warning_of_poses())); }
 
   /// Drops what is under way. Nothing may be called after it.
   void close() {
@@ -138,7 +138,7 @@ void bind_video(py::module_& module) {
       .def("add", &Video::add, py::arg("left"), py::arg("right"), py::arg("pose"), py::arg("starts_anew"))
       .def("end", &Video::end)
       .def("next", &Video::next)
-      .def("doubts", &Video::doubts)
+      .def("warnings", &Video::warnings)
       .def("close", &Video::close);
 }
 

@@ -84,7 +84,7 @@ TEST(Method, BuildsNothingInAFrame) {
   for (int index = 0; index < video.size(); ++index) {
     const ImageMemory left = video.image(index, EGOSGM_LEFT), right = video.image(index, EGOSGM_RIGHT);
     const Plan plan = plan_of(options(32, 0), before.why_not, before.offset.is_known, video.motion(index), wanted);
-    built.method.frame(plan, transfer.upload(left.view(), right.view()), before, after, transfer.given_out());
+    built.method.frame(plan, transfer.upload(left.view(), right.view()), before, after, transfer.output());
     built.context.wait();
     std::swap(before, after);
   }
@@ -100,7 +100,7 @@ TEST(Method, AFrameLeavesTheBeliefBeforeItAsItWas) {
   const auto frame = [&](int index, const Belief& before, Belief& after) {
     const ImageMemory left = video.image(index, EGOSGM_LEFT), right = video.image(index, EGOSGM_RIGHT);
     const Plan plan = plan_of(options(32, 0), before.why_not, before.offset.is_known, video.motion(index), {});
-    built.method.frame(plan, transfer.upload(left.view(), right.view()), before, after, transfer.given_out());
+    built.method.frame(plan, transfer.upload(left.view(), right.view()), before, after, transfer.output());
     built.context.wait();
   };
   frame(0, nothing, first);

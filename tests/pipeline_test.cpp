@@ -84,7 +84,7 @@ void expect_same(const reference::Frame& actual, const reference::Frame& expecte
   if (Evidence::is_of(setting.options)) {
     EXPECT_EQ(of_views(actual.evidence, tracked), of_views(expected.evidence, tracked)) << "evidence";
   }
-  EXPECT_TRUE(same_bits(actual.given_out, expected.given_out, setting.size)) << "disparity that is given out";
+  EXPECT_TRUE(same_bits(actual.output, expected.output, setting.size)) << "disparity that is published";
   EXPECT_TRUE(same_bits(actual.dynamic, expected.dynamic, setting.size)) << "dynamic map";
   EXPECT_TRUE(same_bits(actual.reasons, expected.reasons, setting.size)) << "reasons";
   EXPECT_TRUE(same_bits(actual.output_variance, expected.output_variance, setting.size)) << "output_variance";
@@ -100,8 +100,8 @@ void expect_outputs(const OutputMemory& outputs, const reference::Frame& expecte
   const bool has_prediction = !expected.predicted.disparity.empty();
   const HostMaps predicted = has_prediction ? expected.predicted : empty_maps(size);
   const reference::Pass& pass = expected.passes.back();
-  const std::vector<float> maps[] = {half(expected.given_out, 0),      half(expected.output_variance, 0),
-                                     half(expected.given_out, 1),      half(expected.output_variance, 1),
+  const std::vector<float> maps[] = {half(expected.output, 0),         half(expected.output_variance, 0),
+                                     half(expected.output, 1),         half(expected.output_variance, 1),
                                      half(predicted.disparity, 0),     half(masked(predicted).variance, 0),
                                      half(pass.measured.disparity, 0), half(masked(pass.measured).variance, 0)};
   const auto actual = outputs.maps();
@@ -135,7 +135,7 @@ void expect_report(const FrameReport& report, const reference::Frame& expected, 
   const double cells = 1.0 * views * setting.size.width * setting.size.height * setting.options.disparities;
   EXPECT_EQ(to_string(report.unpredicted), expected.unpredicted);
   EXPECT_NEAR(report.search_fraction, searched / cells, 1e-12);
-  EXPECT_NEAR(report.density, valid_part(half(expected.given_out, 0)), 1e-12);
+  EXPECT_NEAR(report.density, valid_part(half(expected.output, 0)), 1e-12);
   EXPECT_EQ(static_cast<float>(report.vertical_offset_px), expected.vertical_offset_px);
   const double predicted = !has_prediction ? 0 : valid_part(half(expected.predicted.disparity, 0));
   EXPECT_NEAR(report.predicted_fraction, predicted, 1e-12);
@@ -199,7 +199,7 @@ TEST(PipelineScene, ReachesEveryStage) {
   EXPECT_TRUE(differ(second.fused, pass.measured));
   EXPECT_TRUE(differ(second.fused, second.fused_smoothed));
   EXPECT_TRUE(differ(second.fused_smoothed, second.fused_consistent));
-  EXPECT_NE(second.given_out, second.result.disparity);
+  EXPECT_NE(second.output, second.result.disparity);
 }
 
 // The twin knows a pair again; so does the pipeline, over a reset too.

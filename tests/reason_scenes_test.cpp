@@ -209,7 +209,7 @@ std::vector<Case> cases() {
   leaving.away_a_frame_m = 0.4;
   const Scenery blind{{leaving, kWall}, 3, 0, 0, Rectangle{50, 22, 135, 88}};
   all.push_back({"predicted", Reason::kPredicted, 400, blind});
-  // What the board uncovered while the cameras were blind is missing: nothing is given out there without evidence.
+  // What the board uncovered while the cameras were blind is missing: nothing is published there without evidence.
   all.push_back({"predicted_left_tracked", Reason::kPredicted, 500, blind, track_left, 0.6, 0.21});
   return all;
 }

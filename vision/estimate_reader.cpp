@@ -108,13 +108,13 @@ void EstimateReader::compare(const Image& estimate, const Image& truth) {
   alike_.push_back(alike / static_cast<double>(ratios.size()));
 }
 
-std::vector<std::string> EstimateReader::doubts(double scale, double truth_scale) const {
+std::vector<std::string> EstimateReader::warnings(double scale, double truth_scale) const {
   const std::scoped_lock lock(mutex_);
-  std::vector<std::string> doubts;
+  std::vector<std::string> warnings;
   const auto add = [&](const auto&... parts) {
     std::ostringstream text;
     (text << ... << parts);
-    doubts.push_back(text.str());
+    warnings.push_back(text.str());
   };
   if (impossible_ > 0) {
     add(impossible_, " of ", values_,
@@ -137,7 +137,7 @@ std::vector<std::string> EstimateReader::doubts(double scale, double truth_scale
         " times their truth in the median: is it another scale? A PNG of ", scale * factor,
         " steps a pixel needs --scale ", scale * factor,
         "; maps of images of another width, and other formats, need their values changed");
-    return doubts;
+    return warnings;
   }
   const auto is_off = [&](double most) { return ratio > most || ratio < 1 / most; };
   if (is_off(kFarOff)) {
@@ -151,7 +151,7 @@ std::vector<std::string> EstimateReader::doubts(double scale, double truth_scale
         scale * ratio, " --scale ", scale * ratio,
         "; maps of images of another width, and other formats, need their values changed");
   }
-  return doubts;
+  return warnings;
 }
 
 void expect_scaled(const std::string& option, double scale, const std::filesystem::path& file) {

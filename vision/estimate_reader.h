@@ -29,7 +29,7 @@ class EGOSGM_EXPORT EstimateReader {
   void compare(const Image& estimate, const Image& truth);
 
   /// A sentence for each thing that was seen. Both scales: as they were given.
-  std::vector<std::string> doubts(double scale, double truth_scale) const;
+  std::vector<std::string> warnings(double scale, double truth_scale) const;
 
  private:
   mutable std::mutex mutex_;

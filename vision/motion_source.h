@@ -9,7 +9,7 @@
 #include "egosgm/motion.h"
 #include "egosgm/odometry.h"
 #include "vision/frame_source.h"
-#include "vision/pose_doubt.h"
+#include "vision/pose_check.h"
 
 namespace egosgm::vision {
 
@@ -43,7 +43,7 @@ class EGOSGM_EXPORT MotionSource {
 
   /// The objection of the first frames' odometry to the given poses; empty without one, and without poses. To be
   /// asked from the thread of `next`.
-  std::string doubt() const { return suspect_motions(given_, found_); }
+  std::string warning() const { return suspect_motions(given_, found_); }
 
  private:
   void estimate(const VideoPair& pair, FrameMotion& result);

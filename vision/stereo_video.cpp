@@ -20,7 +20,7 @@ StereoVideo::StereoVideo(MotionSource& motions, Pipeline& pipeline, StereoVideoO
       pipeline_(pipeline),
       options_(std::move(options)),
       source_(source),
-      doubt_(options_.calibration, pipeline.options()),
+      input_check_(options_.calibration, pipeline.options()),
       has_odometry_(motions.has_odometry()) {}
 
 StereoVideo::~StereoVideo() {
@@ -115,8 +115,8 @@ VideoFrame StereoVideo::collect() {
   VideoFrame frame = std::move(under_way_.front());
   under_way_.pop_front();
   frame.report = std::move(report);
-  doubt_.add(frame.pair.images.left, frame.pair.images.right, frame.report,
-             frame.motion.motion.has_value() || !has_odometry_);
+  input_check_.add(frame.pair.images.left, frame.pair.images.right, frame.report,
+                   frame.motion.motion.has_value() || !has_odometry_);
   return frame;
 }
 
@@ -129,9 +129,9 @@ std::string StereoVideo::text_of_left_out() const {
          " could not be read: " + first_left_out_;
 }
 
-std::string StereoVideo::doubt_of_poses() const {
+std::string StereoVideo::warning_of_poses() const {
   if (ahead_.valid()) ahead_.wait();
-  return motions_.doubt();
+  return motions_.warning();
 }
 
 void StereoVideo::expect_enough() const {

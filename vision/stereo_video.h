@@ -12,8 +12,8 @@
 
 #include "egosgm/export.h"
 #include "egosgm/pipeline.h"
-#include "vision/doubt.h"
 #include "vision/frame_source.h"
+#include "vision/input_check.h"
 #include "vision/motion_source.h"
 
 namespace egosgm::vision {
@@ -70,9 +70,9 @@ class EGOSGM_EXPORT StereoVideo {
   /// "1 of 4 pairs could not be read: " and why the first one could not.
   std::string text_of_left_out() const;
   /// What speaks against the input; empty where nothing does.
-  std::string doubt() const { return doubt_.text(); }
+  std::string warning() const { return input_check_.text(); }
   /// What speaks against the poses that were given; empty where nothing does.
-  std::string doubt_of_poses() const;
+  std::string warning_of_poses() const;
 
  private:
   bool is_open() const { return !is_ended_ && !unreadable_ && static_cast<int>(under_way_.size()) <= options_.lag; }
@@ -88,7 +88,7 @@ class EGOSGM_EXPORT StereoVideo {
   Pipeline& pipeline_;
   const StereoVideoOptions options_;
   FrameSource* const source_;
-  Doubt doubt_;
+  InputCheck input_check_;
   const bool has_odometry_;
   std::deque<VideoFrame> under_way_;
   std::optional<VideoFrame> unreadable_;  // which comes next

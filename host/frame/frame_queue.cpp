@@ -91,9 +91,9 @@ void FrameQueue::submit(const ImageView& left, const ImageView& right, const std
   if (wanted.has(Output::kReason)) plan.grey_step = levels_of(left, right).step();
   const FrameImages& images = frame.transfer->upload(left, right);
   if (under_way() > 0) context_.let_wait(ocl::Queue::kKernels, under_way_.back().transfer->scratch_fetched());
-  const FrameResults results = method_.frame(plan, images, belief_, frame.after, frame.transfer->given_out());
+  const FrameResults results = method_.frame(plan, images, belief_, frame.after, frame.transfer->output());
   const Workspace& workspace = method_.workspace();
-  frame.transfer->download({.result = results.given_out,
+  frame.transfer->download({.result = results.output,
                             .predicted = plan.predicts() ? &workspace.prediction.maps : nullptr,
                             .measured = results.measured,
                             .bands = workspace.bands,
@@ -128,7 +128,7 @@ DeviceMaps FrameQueue::enqueue(const FrameImages& images, const std::optional<Mo
       plan_of(method_options_, belief_.why_not, belief_.offset.is_known, since_images(belief_, motion), wanted);
   after.images.reset();
   after.since = Motion();
-  const StereoMaps result = method_.frame(plan, images, belief_, after, transfer.given_out()).given_out;
+  const StereoMaps result = method_.frame(plan, images, belief_, after, transfer.output()).output;
   const cl::Event end = done ? context_.end_of_recorded() : cl::Event();
   context_.flush();
 

@@ -17,7 +17,7 @@ namespace egosgm {
 
 /// The results of a frame on the device.
 struct FrameOnDevice {
-  const StereoMaps& result;     // that is given out; no later frame writes it before this one is collected
+  const StereoMaps& result;     // that is published; no later frame writes it before this one is collected
   const StereoMaps* predicted;  // null where there is no prediction. From here on, the next frame writes them:
   const StereoMaps& measured;   // (or they are the result)
   const SearchBands& bands;
@@ -37,8 +37,8 @@ class FrameTransfer {
   /// REQUIRES: what check_frame asks; no frame of this transfer is under way.
   const FrameImages& upload(const ImageView& left, const ImageView& right);
 
-  /// Places for disparity and variance that are given out, of both views; this transfer's until it is released.
-  GivenOut given_out() { return {output_disparity_, output_variance_}; }
+  /// Places for disparity and variance that are published, of both views; this transfer's until it is released.
+  OutputMaps output() { return {output_disparity_, output_variance_}; }
 
   /// Enqueues the way back, behind all that was enqueued for the device.
   void download(const FrameOnDevice& frame, const FrameOutputs& outputs);

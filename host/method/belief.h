@@ -14,7 +14,7 @@ namespace egosgm {
 /// All that survives a frame. A value: copies share the device's memory, so that going back to one is an assignment.
 struct Belief {
   StereoMaps maps;
-  FlagMap evidence;  // of each pixel (kernels/method.h); what has enough of it is given out
+  FlagMap evidence;  // of each pixel (kernels/method.h); what has enough of it is published
   VerticalOffset offset;
   ocl::Buffer<cl_ushort> halved;   // the left image at half of the resolution (DynamicMap)
   bool has_halved = false;         // the frame's `dynamic` was wanted

@@ -49,7 +49,7 @@ class FuseStep {
     if (evidence_) evidence_->begin(belief.evidence);
   }
 
-  /// Writes which of a belief's disparities are given out. REQUIRES: the method has evidence.
+  /// Writes which of a belief's disparities are published. REQUIRES: the method has evidence.
   void publish(const Plan& plan, const Belief& belief, Map& confirmed);
   bool has_evidence() const { return evidence_.has_value(); }
 

@@ -5,7 +5,7 @@
 namespace egosgm {
 
 FrameResults Method::frame(const Plan& plan, const FrameImages& uploaded, const Belief& before, Belief& after,
-                           const GivenOut& given_out) {
+                           const OutputMaps& output) {
   Workspace& w = work_;
   StereoMaps measured = plan.predicts() ? w.measured : after.maps;
   VerticalOffset offset = before.offset.is_known ? before.offset : unknown_;
@@ -23,15 +23,15 @@ FrameResults Method::frame(const Plan& plan, const FrameImages& uploaded, const 
   in(Step::kFuse, [&] { fuse(plan, images, w.prediction, measured, w.fusion, after); });
   Map result = after.maps.disparity;
   in(Step::kPublish, [&] {
-    result = confirmed(plan, after, given_out.disparity);
+    result = confirmed(plan, after, output.disparity);
     const Prediction* prediction = plan.predicts() ? &w.prediction : nullptr;
     publish_.write(plan,
                    {{images, match_.matcher().codes(), plan.grey_step, measured, match_.speckle_runs(plan)},
                     prediction,
                     {after.maps, result, w.fusion.doubtful, evidence_of(plan, after), w.fusion.evidence.evidence}},
-                   before, after, given_out.variance, w.published);
+                   before, after, output.variance, w.published);
   });
-  return {{result, given_out.variance}, measured, offset, images};
+  return {{result, output.variance}, measured, offset, images};
 }
 
 void Method::predict(const Plan& plan, const Belief& belief, Prediction& prediction) {
@@ -65,7 +65,7 @@ void Method::fuse(const Plan& plan, const FrameImages& images, const Prediction&
   if (!options_.temporal) belief.forget(Unpredicted::kNotTemporal);  // a frame alone leaves nothing to the next one
 }
 
-/// Null where all of a belief is given out: the method has no evidence, or the frame no prediction.
+/// Null where all of a belief is published: the method has no evidence, or the frame no prediction.
 const FlagMap* Method::evidence_of(const Plan& plan, const Belief& belief) const {
   return plan.predicts() && fuse_->has_evidence() ? &belief.evidence : nullptr;
 }

@@ -32,7 +32,7 @@ struct Workspace {
 
 /// Results of a frame on the device. These are handles: a later frame overwrites their memory.
 struct FrameResults {
-  StereoMaps given_out;
+  StereoMaps output;
   StereoMaps measured;
   VerticalOffset offset;  // by which the right image was resampled for the last match
   FrameImages images;     // that were matched
@@ -47,10 +47,10 @@ class Method {
   /// Builds what images of `type` need, and what is wanted of them. Enqueues nothing.
   void prepare(PixelType type, const Wanted& wanted = {});
 
-  /// Enqueues a frame. Writes `after` and `given_out`, which share no memory with `before`.
+  /// Enqueues a frame. Writes `after` and `output`, which share no memory with `before`.
   /// REQUIRES: the images' type was prepared, with what the plan wants.
   FrameResults frame(const Plan& plan, const FrameImages& uploaded, const Belief& before, Belief& after,
-                     const GivenOut& given_out);
+                     const OutputMaps& output);
 
   /// Called after each step of each frame; null: nobody looks on.
   std::function<void(Step)> observer;

@@ -38,7 +38,7 @@ void PublishStep::write(const Plan& plan, const Reasons::Inputs& inputs, const B
                         Map& variance, Published& published) {
   const Wanted& wanted = plan.wanted;
   if (wanted.has(Output::kVariance) || wanted.has(Output::kRightVariance)) {
-    output_variance_.compute(inputs.fused.given_out, inputs.fused.belief, inputs.match.measured, variance,
+    output_variance_.compute(inputs.fused.output, inputs.fused.belief, inputs.match.measured, variance,
                              wanted.has(Output::kRightVariance) ? Views::kBoth : Views::kLeft);
   }
   if (wanted.has(Output::kReason)) reasons_[inputs.match.images.type].explain(inputs, published.reason);
@@ -46,7 +46,7 @@ void PublishStep::write(const Plan& plan, const Reasons::Inputs& inputs, const B
   if (after.has_halved) dynamic_map_->keep(inputs.match.images, after.halved);
   if (!wanted.has(Output::kDynamic)) return;
   if (before.has_halved && plan.predicts()) {
-    dynamic_map_->mark({before.halved, before.maps.disparity}, {after.halved, inputs.fused.given_out}, *plan.motion,
+    dynamic_map_->mark({before.halved, before.maps.disparity}, {after.halved, inputs.fused.output}, *plan.motion,
                        published.dynamic);
   } else {
     context_.enter("DynamicMap");

@@ -30,7 +30,7 @@ struct Published {
   std::vector<PublishedMap> maps(const Wanted& wanted) const;
 };
 
-/// Makes what is given out and no later frame rests on.
+/// Makes what is published and no later frame rests on.
 class PublishStep {
  public:
   PublishStep(ocl::Context& context, shared::ImageSize size, const Calibration& calibration,
@@ -40,7 +40,7 @@ class PublishStep {
   void prepare(PixelType type, const Wanted& wanted);
 
   /// Writes what the plan wants. `before`: the belief of the frame before. `after`: this frame's; it keeps the left
-  /// image for the next frame's `dynamic` where this frame's is wanted. `variance`: [px^2] of what is given out.
+  /// image for the next frame's `dynamic` where this frame's is wanted. `variance`: [px^2] of what is published.
   void write(const Plan& plan, const Reasons::Inputs& inputs, const Belief& before, Belief& after, Map& variance,
              Published& published);
 

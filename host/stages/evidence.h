@@ -22,7 +22,7 @@ struct CoarseView {
   const Map& disparity;                 // [coarse px]
 };
 
-/// Says how much better than chance the images of a frame match, whatever the band was; and what is given out: what has
+/// Says how much better than chance the images of a frame match, whatever the band was; and what is published: what has
 /// been confirmed. Source: the existence probability of target tracking (Musicki, Evans, Stankovic 1994) and the sums
 /// of occupancy maps, with the Hamming distances of codes in place of likelihoods.
 class Evidence {

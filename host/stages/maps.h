@@ -63,9 +63,9 @@ struct StereoMaps {
 };
 
 /// The maps that a frame publishes of its belief.
-struct GivenOut {
+struct OutputMaps {
   Map& disparity;  // what is confirmed; not written where that is all of the belief
-  Map& variance;   // of what is given out
+  Map& variance;   // of what is published
 };
 
 /// A map of both views of bytes: 1 where something holds, else 0.

@@ -15,14 +15,14 @@ OutputVariance::OutputVariance(ocl::Context& context, shared::ImageSize size, co
       combine_(stage_, "combine"),
       keep_(stage_, "keep") {}
 
-void OutputVariance::compute(const Map& given_out, const StereoMaps& belief, const StereoMaps& measured, Map& variance,
+void OutputVariance::compute(const Map& output, const StereoMaps& belief, const StereoMaps& measured, Map& variance,
                              Views views) {
-  if (!options_.enabled) return stage_.launch_pixels(keep_, count(views), given_out, belief.variance, variance);
-  stage_.launch_pixels(of_each_pixel_, count(views), given_out, belief.disparity, belief.variance, measured.disparity,
+  if (!options_.enabled) return stage_.launch_pixels(keep_, count(views), output, belief.variance, variance);
+  stage_.launch_pixels(of_each_pixel_, count(views), output, belief.disparity, belief.variance, measured.disparity,
                        measured.variance, variance, roughness_);
   stage_.launch_pixels(row_means_, count(views), variance, roughness_, mean_variance_, mean_roughness_);
-  stage_.launch_pixels(combine_, count(views), options_.scale, options_.roughness_weight, options_.jump_weight,
-                       given_out, mean_variance_, mean_roughness_, variance);
+  stage_.launch_pixels(combine_, count(views), options_.scale, options_.roughness_weight, options_.jump_weight, output,
+                       mean_variance_, mean_roughness_, variance);
 }
 
 }  // namespace egosgm

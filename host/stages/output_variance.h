@@ -7,7 +7,7 @@
 
 namespace egosgm {
 
-/// The variance that is given out, of a disparity that may lie on a wrong surface too, from the filter's p and the
+/// The variance that is published, of a disparity that may lie on a wrong surface too, from the filter's p and the
 /// measurement's r, which are of a pixel on the right one: s = scale * (mean of (p r^3)^(1/4) over 17x17 pixels)^1.5 +
 /// roughness_weight * (mean over 7x7 pixels of how far the disparity is from a plane's)^2 + jump_weight * (largest
 /// difference to the disparities two pixels off)^2; and of this sum
@@ -18,9 +18,9 @@ class OutputVariance {
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
   OutputVariance(ocl::Context& context, shared::ImageSize size, const OutputVarianceOptions& options, int pixels = 0);
 
-  /// Writes the variance [px^2] of the disparities that are given out of a belief; 0 where there is none. `measured`:
+  /// Writes the variance [px^2] of the disparities that are published of a belief; 0 where there is none. `measured`:
   /// what the belief's frame measured; may be the belief.
-  void compute(const Map& given_out, const StereoMaps& belief, const StereoMaps& measured, Map& variance, Views views);
+  void compute(const Map& output, const StereoMaps& belief, const StereoMaps& measured, Map& variance, Views views);
 
  private:
   ocl::Stage stage_;

@@ -78,7 +78,7 @@ void Reasons::explain(const Inputs& inputs, Bytes& reasons) {
   stage_.launch_pixels(explain_, /*views=*/1, EGOSGM_LEAST_CHANGE * match.grey_step, bytes, has_census_, repeats_,
                        has_prediction, prediction ? prediction->warped.disparity : match.measured.disparity,
                        prediction ? prediction->hidden : bytes, match.measured.disparity, has_runs,
-                       match.runs ? *match.runs : no_runs, fused.given_out, fused.doubtful, fused.evidence != nullptr,
+                       match.runs ? *match.runs : no_runs, fused.output, fused.doubtful, fused.evidence != nullptr,
                        fused.evidence ? *fused.evidence : fused.doubtful, fused.block_evidence, reasons);
 }
 

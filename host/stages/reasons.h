@@ -24,7 +24,7 @@ class Reasons {
   /// Results of fusion.
   struct Fused {
     const StereoMaps& belief;
-    const Map& given_out;                       // of its disparities
+    const Map& output;                          // of its disparities
     const FlagMap& doubtful;                    // what KalmanUpdate says; not read without a prediction
     const FlagMap* evidence;                    // the same; null: the method has none
     const ocl::Buffer<cl_int>& block_evidence;  // of Evidence; not read without evidence

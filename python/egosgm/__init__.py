@@ -29,7 +29,7 @@ from ._egosgm import *  # noqa: F401,F403
 from ._egosgm import __version__
 from .calibration.reader import read_calibration, read_euroc_rig, read_opencv_rig
 from .geometry.depth import depth_sigma_from_disparity
-from .drive import Drive, DriveFrame, run
+from .drive import StereoVideo, VideoFrame, run
 from .diagnostics.examination import match_pair
 from .matcher import Matcher
 from .geometry.points import PointCloud, point_cloud, write_ply
@@ -38,7 +38,7 @@ from .calibration.rectification import Rectification, StereoRig
 from .values import as_dataclass as _as_dataclass
 from .evaluation.video_evaluation import DensityFigures, RegionFigures, VideoEvaluation, VideoFigures, evaluate_video, move_map
 
-__all__ = ["__version__", "read_calibration", "read_euroc_rig", "read_opencv_rig", "depth_sigma_from_disparity", "Rectification", "StereoRig", "Drive", "DriveFrame", "match_pair", "Matcher", "run", "PointCloud", "point_cloud", "write_ply", "MotionError", "PoseEvaluation", "SegmentError", "evaluate_poses", "DensityFigures", "RegionFigures", "VideoEvaluation", "VideoFigures", "evaluate_video", "move_map",
+__all__ = ["__version__", "read_calibration", "read_euroc_rig", "read_opencv_rig", "depth_sigma_from_disparity", "Rectification", "StereoRig", "StereoVideo", "VideoFrame", "match_pair", "Matcher", "run", "PointCloud", "point_cloud", "write_ply", "MotionError", "PoseEvaluation", "SegmentError", "evaluate_poses", "DensityFigures", "RegionFigures", "VideoEvaluation", "VideoFigures", "evaluate_video", "move_map",
            *(name for name in dir(_egosgm) if not name.startswith("_"))]
 
 

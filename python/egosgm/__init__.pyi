@@ -12,8 +12,8 @@ from .calibration.reader import read_calibration as read_calibration
 from .calibration.reader import read_euroc_rig as read_euroc_rig
 from .calibration.reader import read_opencv_rig as read_opencv_rig
 from .geometry.depth import depth_sigma_from_disparity as depth_sigma_from_disparity
-from .drive import Drive as Drive
-from .drive import DriveFrame as DriveFrame
+from .drive import StereoVideo as StereoVideo
+from .drive import VideoFrame as VideoFrame
 from .drive import run as run
 from .diagnostics.examination import match_pair as match_pair
 from .matcher import Matcher as Matcher

@@ -18,7 +18,7 @@ from .calibration.rectification import StereoRig
 
 
 @dataclasses.dataclass(frozen=True, repr=False, eq=False)
-class DriveFrame:
+class VideoFrame:
     """A frame of a drive: images, maps and what happened."""
 
     number: int
@@ -67,11 +67,11 @@ class DriveFrame:
 
     def __repr__(self) -> str:
         height, width = self.left.shape[:2]
-        return (f"<DriveFrame {self.name}: {width}x{height}, density {self.report.density:.1%}, "
+        return (f"<VideoFrame {self.name}: {width}x{height}, density {self.report.density:.1%}, "
                 f"search {min(1, self.report.search_fraction):.1%}>")
 
 
-class Drive:
+class StereoVideo:
     """What run() gives: iterate over it, as often as you like."""
 
     def __init__(self, source: Union[str, "os.PathLike[str]", _egosgm.StereoSequence, Bag, Iterable[Tuple[NDArray[Any], NDArray[Any]]]],
@@ -130,9 +130,9 @@ class Drive:
     def __repr__(self) -> str:
         name = self.sequence.title if self.sequence is not None else "pairs of images"
         count = f", {len(self)} frames" if hasattr(self._source, "__len__") else ""
-        return f"<Drive {name}{count}{', no motion' if self._odometry_options is None else ''}>"
+        return f"<StereoVideo {name}{count}{', no motion' if self._odometry_options is None else ''}>"
 
-    def __iter__(self) -> Iterator[DriveFrame]:
+    def __iter__(self) -> Iterator[VideoFrame]:
         if self._begun and hasattr(self._source, "__next__"):
             raise _egosgm.InvalidArgument("the pairs come from an iterator, which gives them once: give a list, or make a drive of a new iterator")
         self._begun = True
@@ -165,7 +165,7 @@ class Drive:
     def _tell(self, text: str) -> None:
         warnings.warn(text, UserWarning, stacklevel=4)
 
-    def _frames(self) -> Iterator[DriveFrame]:
+    def _frames(self) -> Iterator[VideoFrame]:
         """Iterations share nothing, so that each may end where it likes, and two may run at once. The loop is C++'s (vision/stereo_video.h)."""
         pipeline, video, failure = None, None, None
         pairs = self._pairs() if self.sequence is None else iter(())
@@ -198,13 +198,13 @@ class Drive:
                     self._tell(f"frame {name}: left out: {left_out}")
                     continue
                 found_objects = tracker.process(images[0], maps.disparity, maps.dynamic, motion) if tracker else None
-                yield DriveFrame(number, name, *images, maps, None if self._odometry_options is None else odometry, motion, self.calibration,
+                yield VideoFrame(number, name, *images, maps, None if self._odometry_options is None else odometry, motion, self.calibration,
                                  found_objects, tracker.scene_flow() if tracker else None)
             if failure:
                 raise failure
-            doubts = "; ".join(filter(None, (*video.doubts(), self._source.gaps.text() if isinstance(self._source, Bag) else "")))
-            if doubts:
-                self._tell(f"{doubts}: `egosgm doctor` tells why")
+            told = "; ".join(filter(None, (*video.warnings(), self._source.gaps.text() if isinstance(self._source, Bag) else "")))
+            if told:
+                self._tell(f"{told}: `egosgm doctor` tells why")
         finally:
             if video:
                 video.close()
@@ -229,7 +229,7 @@ def _bar(progress: Optional[bool]):
 def run(source: Union[str, "os.PathLike[str]", _egosgm.StereoSequence, Bag, Iterable[Tuple[NDArray[Any], NDArray[Any]]]],
         calibration: "_egosgm.Calibration | str | os.PathLike[str] | None" = None, *, frames: str = "", motion: bool = True,
         outputs: Union[str, Sequence[str]] = ("disparity", "variance"), odometry: Optional[Dict[str, Any]] = None, lag: int = 1,
-        progress: Optional[bool] = None, objects: bool = False, **options: Any) -> Drive:
+        progress: Optional[bool] = None, objects: bool = False, **options: Any) -> StereoVideo:
     """Disparity and variance for each frame of a drive:
 
         for frame in egosgm.run("drive/"):
@@ -244,4 +244,4 @@ def run(source: Union[str, "os.PathLike[str]", _egosgm.StereoSequence, Bag, Iter
     objects=True: `frame.objects` has what moves by itself, and `frame.scene_flow` where the pixels of the frame before went.
     All else is for Pipeline: device, preset and its options.
     """
-    return Drive(source, calibration, frames=frames, motion=motion, outputs=outputs, odometry=odometry, lag=lag, progress=progress, objects=objects, **options)
+    return StereoVideo(source, calibration, frames=frames, motion=motion, outputs=outputs, odometry=odometry, lag=lag, progress=progress, objects=objects, **options)

@@ -99,13 +99,13 @@ def _figures(counts: Any) -> Dict[str, Any]:
     return {{"mae_px": "mae", "mean_error_px": "mean_error"}.get(name, name): None if value != value else value for name, value in values.items()}
 
 
-def _doubts(text: str) -> List[Dict[str, str]]:
-    """What a run doubts, one by one: "what (remedy), what; what" as `egosgm run` says it."""
-    inner, doubts = r"\((?:[^()]|\([^()]*\))*\)", []
+def _warnings(text: str) -> List[Dict[str, str]]:
+    """The warnings of a run, one by one: "what (remedy), what; what" as `egosgm run` says it."""
+    inner, warnings = r"\((?:[^()]|\([^()]*\))*\)", []
     for part in re.findall(rf"(?:[^,;(]|{inner}|[,;](?! ))+", text):
         what, remedy = re.fullmatch(rf"(.*?)(?: ({inner}))?", part.strip(), re.DOTALL).groups("")  # type: ignore[union-attr]
-        doubts.append({"what": what, "remedy": f"run it with {remedy[1:-1]}" if remedy.startswith("(--") else remedy[1:-1] or "`egosgm doctor` tells why"})
-    return doubts
+        warnings.append({"what": what, "remedy": f"run it with {remedy[1:-1]}" if remedy.startswith("(--") else remedy[1:-1] or "`egosgm doctor` tells why"})
+    return warnings
 
 
 _SIGMA_LEAST_PX, _SIGMA_STEP = 0.01, 1.04  # a byte's scale; 0: none
@@ -177,7 +177,7 @@ class _Page:
         data: Dict[str, Any] = {**self._truth(), **self._pictures(), **self._paths()}
         data["changed"] = self._changed_options()
         data["notes"] = self._notes
-        data["doubts"] = _doubts(str(self._run.get("doubt", "")))
+        data["warnings"] = _warnings(str(self._run.get("warning", "")))
         data["scales"] = {"sigma_least_px": _SIGMA_LEAST_PX, "sigma_step": _SIGMA_STEP, "reasons": _egosgm.REASONS}
         data["run"] = _with_short_paths({**self._run, "frames": [frame.entry for frame in self._frames]})
         text = json.dumps(data).replace("<", "\\u003c")  # nothing in a text may end the script element

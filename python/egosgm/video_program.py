@@ -272,7 +272,7 @@ def _json_of(found: VideoInput, over_frames: List[VideoFigures], total: VideoCou
     return {"frames": len(found.frames), "pairs": found.successors, "motion": found.motion_source, "figures": vars(figures_of(total)),
             "regions": {name: vars(region) for name, region in regions_of(total).items()},
             "over_frames": [{"name": files.name, **vars(figures)} for files, figures in zip(found.frames, over_frames)],
-            **({"density": _density_json(density)} if density else {}), **({"notes": found.notes} if found.notes else {}), **({"doubts": doubts} if (doubts := found.reader.doubts(found.given.scale, found.given.truth_scale)) else {})}
+            **({"density": _density_json(density)} if density else {}), **({"notes": found.notes} if found.notes else {}), **({"warnings": warnings} if (warnings := found.reader.warnings(found.given.scale, found.given.truth_scale)) else {})}
 
 
 def _cell(value: float, width: int, unit: str) -> str:
@@ -297,7 +297,7 @@ def _text_of(found: VideoInput, total: VideoCounts) -> str:
         lines += ["", f"{'density':<12}{'reached':>12}{'bad':>12}"]
         lines += [f"{f'{share:.0f} %':<12}{_cell(reached, 12, ' %')}{_cell(bad, 12, ' %')}"
                   for share, reached, bad in zip(density.density_percent, density.reached_percent, density.bad_percent)]
-    return "\n".join(lines + found.notes + found.reader.doubts(found.given.scale, found.given.truth_scale))
+    return "\n".join(lines + found.notes + found.reader.warnings(found.given.scale, found.given.truth_scale))
 
 
 def _expect_partners(given: argparse.Namespace) -> None:

@@ -212,7 +212,7 @@ class Doubts(Brought):
             if named:
                 self.assertIn("the given poses contradict the images", said)
                 self.assertIn(named, said)
-                self.assertIn(named, self.report(out)["doubt"])
+                self.assertIn(named, self.report(out)["warning"])
             else:
                 self.assertNotIn("given poses", said)
 
@@ -313,7 +313,7 @@ class Maps(Brought):
 
     def figures(self, name, *arguments):
         said = json.loads(self.assert_works("eval", self.maps / name, self.maps / "truth.npy", "--json", *arguments))
-        return said["pooled"]["density"], said["pooled"]["bad_or_missing"], " ".join(said.get("doubts", []))
+        return said["pooled"]["density"], said["pooled"]["bad_or_missing"], " ".join(said.get("warnings", []))
 
     def test_one_rule_of_what_has_no_value(self):
         sixteenths = numpy.rint(self.truth * 16)
@@ -331,10 +331,10 @@ class Maps(Brought):
             self.png16(self.maps / "map.png", numpy.where(self.missing, nothing, sixteenths))
             self.npy(self.maps / "map.npy", numpy.where(self.missing, nothing, sixteenths).astype(numpy.int16))
             for file in ("map.png", "map.npy"):
-                density, bad, doubts = self.figures(file, "--scale", 16)
+                density, bad, warnings = self.figures(file, "--scale", 16)
                 self.assertAlmostEqual(density, expected)
                 self.assertAlmostEqual(bad, 100 - expected)
-                self.assertEqual("no disparities" in doubts, nothing < 0 and file.endswith(".png"))
+                self.assertEqual("no disparities" in warnings, nothing < 0 and file.endswith(".png"))
 
     def test_negative_disparities_that_differ_are_values(self):
         self.npy(self.maps / "truth.npy", numpy.abs(self.truth))
@@ -343,9 +343,9 @@ class Maps(Brought):
 
     def test_what_is_wider_than_the_image_is_no_disparity(self):
         self.npy(self.maps / "wide.npy", numpy.where(self.missing, 4095, self.truth).astype(numpy.float32))
-        density, _, doubts = self.figures("wide.npy")
+        density, _, warnings = self.figures("wide.npy")
         self.assertAlmostEqual(density, 100 * (1 - self.missing.mean()))
-        self.assertIn("beyond the image's width", doubts)
+        self.assertIn("beyond the image's width", warnings)
 
     def test_a_file_that_is_compared_with_itself_is_told(self):
         self.pfm(self.maps / "copy.pfm", self.truth)

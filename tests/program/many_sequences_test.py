@@ -191,9 +191,9 @@ class ManySequences(ProgramTest):
         part.write_text(json.dumps(first | {"pairs": first["pairs"][1:]}))
         for again in (out / f"../{out.name}/0.json", part):
             self.assert_refused(["eval", "--merge", *reports, again], again, f"holds pairs of {reports[0]}", "once")
-        part.write_text(json.dumps(first | {"doubts": ["another scale?"]}))
+        part.write_text(json.dumps(first | {"warnings": ["another scale?"]}))
         self.assertIn(f"{part}: another scale?", self.assert_works("eval", "--merge", part))
-        self.assertEqual(json.loads(self.assert_works("eval", "--merge", part, "--json"))["doubts"], [f"{part}: another scale?"])
+        self.assertEqual(json.loads(self.assert_works("eval", "--merge", part, "--json"))["warnings"], [f"{part}: another scale?"])
         self.assert_refused(["eval", "--merge", reports[0], "--mask", reports[1]], "--merge")
         self.assert_refused(["eval", out / "street-0", "--merge", reports[0]], "--merge")
 

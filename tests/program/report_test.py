@@ -359,16 +359,16 @@ class ReportInBrowser(ReportTest):
                 self.assertAlmostEqual(value / expected, 1, delta=near, msg=reading)
         self.assert_no_errors()
 
-    def test_a_doubt_and_its_remedy_stand_apart(self):
+    def test_a_warning_and_its_remedy_stand_apart(self):
         out = self.new_folder() / "out"
         shutil.copytree(self.out, out)
         (out / "report.html").unlink()
         report = self.report(out)
-        report["doubt"] = "density 24 % in the mean, 62 % of the image is nearer than the range (--disparities 128), the principal point is far (cx 1, cy 2) (scale fx, fy), a baseline of 3 m (few are wider, and is it in decimetres (0.3 m)?); poses in another order"
+        report["warning"] = "density 24 % in the mean, 62 % of the image is nearer than the range (--disparities 128), the principal point is far (cx 1, cy 2) (scale fx, fy), a baseline of 3 m (few are wider, and is it in decimetres (0.3 m)?); poses in another order"
         report["notes"] = ["1 left image has no partner"]
         (out / "report.json").write_text(json.dumps(report))
         self.assert_works("report", out)
-        self.assertEqual(self.data(out / "report.html")["doubts"], [
+        self.assertEqual(self.data(out / "report.html")["warnings"], [
             {"what": "density 24 % in the mean", "remedy": "`egosgm doctor` tells why"},
             {"what": "62 % of the image is nearer than the range", "remedy": "run it with --disparities 128"},
             {"what": "the principal point is far (cx 1, cy 2)", "remedy": "scale fx, fy"},

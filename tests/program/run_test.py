@@ -106,7 +106,7 @@ class Run(ProgramTest):
         report = self.report(out)
         self.assertTrue(report["finished"])
         self.assertNotIn("stopped_by", report)
-        self.assertNotIn("doubt", report)
+        self.assertNotIn("warning", report)
         self.assertNotIn("egosgm doctor", text)
         for key in ("device", "driver", "version", "options"):
             self.assertTrue(report[key])
@@ -162,13 +162,13 @@ class Run(ProgramTest):
             self.assertEqual([sum(bool(re.search(text, line)) for line in notes) for text in (depths, alone)], [1, 1], notes)
         self.assertEqual(len(quiet.stderr.splitlines()), 2)
 
-    def assert_doubted(self, arguments, *named):
+    def assert_warned(self, arguments, *named):
         """The last line of run names doctor, which finds a problem with the very arguments."""
         out = self.new_folder()
         lines = self.assert_works("run", *arguments, "--out", out).splitlines()
         for text in named:
             self.assertIn(text, lines[-1])
-            self.assertIn(text, self.report(out)["doubt"])
+            self.assertIn(text, self.report(out)["warning"])
         command = lines[-1][lines[-1].index("`") + 1:lines[-1].rindex("`")]
         self.assertTrue(command.startswith("egosgm doctor "), command)
         done = egosgm(*shlex.split(command)[1:])
@@ -182,13 +182,13 @@ class Run(ProgramTest):
         (swapped / "image_0").rename(swapped / "left")
         (swapped / "image_1").rename(swapped / "image_0")
         (swapped / "left").rename(swapped / "image_1")
-        self.assert_doubted(["--odometry", swapped], f"no motion in {FRAMES - 1} of {FRAMES - 1} frames", "density")
-        self.assert_doubted(["--dataset", swapped, "--frames", "1:3"], "no motion in 2 of 2 frames")
+        self.assert_warned(["--odometry", swapped], f"no motion in {FRAMES - 1} of {FRAMES - 1} frames", "density")
+        self.assert_warned(["--dataset", swapped, "--frames", "1:3"], "no motion in 2 of 2 frames")
         wide = self.broken_street()
         rows = [line.split() for line in (wide / "calib.txt").read_text().splitlines()]
         rows[1][4] = str(1000 * float(rows[1][4]))
         (wide / "calib.txt").write_text("\n".join(" ".join(row) for row in rows) + "\n")
-        self.assert_doubted(["--odometry", wide], "baseline of", "millimetres")
+        self.assert_warned(["--odometry", wide], "baseline of", "millimetres")
 
     def test_interpolate_fills_a_folder_of_its_own(self):
         out = self.new_folder()

@@ -348,7 +348,7 @@ def test_a_recording_that_is_finished_stays_where_the_viewer_fails():
 
 
 def test_a_folder_is_that_of_any_run(tmp_path, street, frames, street_folder, capfd):
-    """The maps of a folder with the same images, and what report and cloud read; options, doubts and --resume are those of any run."""
+    """The maps of a folder with the same images, and what report and cloud read; options, warnings and --resume are those of any run."""
     bag, out = record("sqlite", tmp_path / "drive", street, frames), tmp_path / "result"
     given = ["--bag", bag, *TOPICS, *SET, "--out", out, "--write", "variance,color"]
     told = program(*given, "--save-config", tmp_path / "config.json")
@@ -365,7 +365,7 @@ def test_a_folder_is_that_of_any_run(tmp_path, street, frames, street_folder, ca
     np.testing.assert_allclose(np.loadtxt(out / "poses.txt"), np.loadtxt(tmp_path / "of_folder/poses.txt"), atol=1e-6)
     assert egosgm.read_calibration(out / "calibration.txt").baseline_m == pytest.approx(street.calibration.baseline_m)
     report = json.loads((out / "report.json").read_text())
-    assert report["finished"] and report["input"] == "bag drive" and "doubt" not in report
+    assert report["finished"] and report["input"] == "bag drive" and "warning" not in report
     assert [frame["stamp_ns"] for frame in report["frames"]] == [START + i * RATE_NS for i in range(FRAMES)]
     assert cloud_program.main([str(out)]) == 0
     refused(capfd, given, "is not empty")
@@ -944,7 +944,7 @@ def rescaled(factor):
     return change
 
 
-def test_doubts_of_a_baseline(tmp_path, street, frames, capfd):
+def test_warnings_of_a_baseline(tmp_path, street, frames, capfd):
     assert "doctor" not in told_of(capfd, drive_of(street, frames).write(tmp_path / "good"))
     cases = (("cm", 100, "centimetres (0.54 m)"), ("mm", 1000, "millimetres (0.54 m)"), ("no_fx", 1 / street.calibration.fx, "is fx missing"))
     for name, factor, named in cases:

@@ -469,7 +469,7 @@ def test_the_program_takes_calibrations_that_the_package_reads(street, street_fo
 
 def test_rows_that_no_alignment_mends_are_told(street, frames):
     apart = [(frame.left, np.roll(frame.right, 3, axis=0)) for frame in frames]
-    with pytest.warns(UserWarning, match="rows of the two views lie 2 px apart, the most that is mended"):
+    with pytest.warns(UserWarning, match="rows of the two views lie 2 px apart, the most that is corrected"):
         list(egosgm.run(apart, street.calibration, **OPTIONS))
 
 
@@ -496,7 +496,7 @@ CAMERA = egosgm.Calibration(fx=100, fy=50, cx=2, cy=1, baseline_m=0.5, doffs_px=
 def frame_of(disparity, variance, reason=None, left=None):
     """As run() gives it, of maps by hand."""
     maps = types.SimpleNamespace(disparity=np.float32(disparity), variance=np.float32(variance), reason=reason)
-    return egosgm.DriveFrame(0, "000000", np.full(np.shape(disparity), 90, np.uint8) if left is None else left, None, maps, None, None, CAMERA)
+    return egosgm.VideoFrame(0, "000000", np.full(np.shape(disparity), 90, np.uint8) if left is None else left, None, maps, None, None, CAMERA)
 
 
 def test_a_cloud_has_the_points_that_are_sure(tmp_path):

@@ -51,7 +51,7 @@ Verdict judge(shared::ImageSize size, float gate_px, const FrameEvidence& frame,
 int supporters_of(shared::ImageSize size, const testing::HostMaps& maps, std::size_t view, int x, int y, float d,
                   float most);
 
-/// What is given out of a belief with its evidence: what has much, and what confirmed pixels around support. `by_left`:
+/// What is published of a belief with its evidence: what has much, and what confirmed pixels around support. `by_left`:
 /// a right pixel has the evidence of the left pixel that it sees, and must be confirmed itself.
 std::vector<float> confirmed(shared::ImageSize size, const testing::HostMaps& belief, bool by_left);
 

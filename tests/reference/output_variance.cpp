@@ -95,14 +95,14 @@ float calibrated(float sum) {
 }  // namespace
 
 std::vector<float> output_variance(shared::ImageSize size, const OutputVarianceOptions& options,
-                                   const std::vector<float>& given_out, const testing::HostMaps& belief,
+                                   const std::vector<float>& output, const testing::HostMaps& belief,
                                    const testing::HostMaps& measured) {
-  if (!options.enabled) return testing::masked({given_out, belief.variance}).variance;
+  if (!options.enabled) return testing::masked({output, belief.variance}).variance;
   std::vector<float> out;
   const std::vector<float> variances = blends(belief, measured);
   const std::size_t pixels = static_cast<std::size_t>(size.width) * size.height;
   for (std::size_t view = 0; view < 2; ++view) {
-    const Plane disparity{size, given_out.data() + view * pixels};
+    const Plane disparity{size, output.data() + view * pixels};
     const Plane variance{size, variances.data() + view * pixels};
     const std::vector<float> rough = roughness(disparity);
     for (int y = 0; y < size.height; ++y) {

@@ -10,7 +10,7 @@
 namespace egosgm::reference {
 
 std::vector<float> output_variance(shared::ImageSize size, const OutputVarianceOptions& options,
-                                   const std::vector<float>& given_out, const testing::HostMaps& belief,
+                                   const std::vector<float>& output, const testing::HostMaps& belief,
                                    const testing::HostMaps& measured);
 
 }  // namespace egosgm::reference

@@ -80,19 +80,19 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
   frame.evidence = has_prediction ? frame.fused.evidence
                                   : std::vector<std::uint8_t>(frame.result.disparity.size(),
                                                               static_cast<std::uint8_t>(kTrustedEvidence));
-  frame.given_out = frame.result.disparity;
+  frame.output = frame.result.disparity;
   if (has_prediction && has_evidence()) {
     testing::HostMaps belief = frame.result;
     belief.evidence = frame.evidence;
-    frame.given_out = confirmed(size_, belief, !options_.track_right);
+    frame.output = confirmed(size_, belief, !options_.track_right);
   }
   frame.dynamic.assign(static_cast<std::size_t>(size_.width) * size_.height, 0);
   if (has_prediction) {
-    frame.dynamic = dynamic_map(size_, {greys_, bits_, belief_->disparity},
-                                {images.greys, images.bits, frame.given_out}, motions->left_back);
+    frame.dynamic = dynamic_map(size_, {greys_, bits_, belief_->disparity}, {images.greys, images.bits, frame.output},
+                                motions->left_back);
   }
   frame.output_variance =
-      output_variance(size_, options_.output_variance, frame.given_out, frame.result, frame.passes.back().measured);
+      output_variance(size_, options_.output_variance, frame.output, frame.result, frame.passes.back().measured);
   frame.reasons = explain(images, frame);
   if (!options_.temporal) return frame;
   offset_ = frame.passes.back().offset;
@@ -121,7 +121,7 @@ std::vector<std::uint8_t> Pipeline::explain(const Images& images, const Frame& f
        .hidden = frame.predicted.hidden,
        .consistent = pass.consistent.disparity,
        .measured = pass.measured.disparity,
-       .belief = {frame.given_out, frame.result.variance},
+       .belief = {frame.output, frame.result.variance},
        .doubtful = frame.fused.doubtful,
        .evidence = !frame.predicted.disparity.empty() && has_evidence() ? frame.evidence : std::vector<std::uint8_t>{},
        .block_evidence = frame.block_evidence});

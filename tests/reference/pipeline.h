@@ -48,9 +48,9 @@ struct Frame {
   testing::HostMaps result;  // on which the next frame rests
   std::vector<std::uint8_t> evidence;
   std::vector<int> block_evidence;  // of both views
-  std::vector<float> given_out;     // disparities that are confirmed
+  std::vector<float> output;        // disparities that are confirmed
   std::vector<std::uint8_t> dynamic, reasons;
-  std::vector<float> output_variance;  // given out in place of the result's
+  std::vector<float> output_variance;  // published in place of the result's
   float vertical_offset_px = 0;        // that the last pass was resampled by in the middle
 };
 

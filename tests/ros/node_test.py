@@ -501,9 +501,9 @@ class Parameters(unittest.TestCase):
             node._process(image, image)
             self.assertIsNot(node._pipeline, before)
             self.assertEqual(node._cameras.calibration.fx, focal)
-            self.assertEqual(node._doubt, "")
+            self.assertEqual(node._warning, "")
         node._process(image, image)
-        self.assertIn("pairs of one stamp, 2.000 s", node._doubt)
+        self.assertIn("pairs of one stamp, 2.000 s", node._warning)
 
     def test_infos_that_change_and_the_range_that_messages_tell(self):
         from sensor_msgs.msg import CameraInfo, Image
@@ -525,14 +525,14 @@ class Parameters(unittest.TestCase):
             node._process(image, image)
         self.assertEqual([message.f for message in sent], [100, 100, 101, 101])
         self.assertEqual([(message.min_disparity, message.max_disparity) for message in sent], [(4, 19)] * 4)
-        self.assertEqual(node._topics_doubt, "")
+        self.assertEqual(node._topics_warning, "")
         for name, lens, is_told in (("image_raw", 0.1, True), ("image_raw", 0.0, False), ("image_rect_color", 0.1, False)):
             node = self.node("--ros-args", "-r", f"left/image_rect:=left/{name}", "-r", f"right/image_rect:=right/{name}", disparities=16, temporal=False)
             node.trigger_configure()
             for side in ("left", "right"):
                 node._on_info(side, CameraInfo(height=32, width=64, d=[lens] * 5, k=info.k, p=[101.0, 0, 32.0, -101.0 * (side == "right"), *info.p[4:]]))
             node._process(image, image)
-            self.assertEqual("/left/image_raw and /right/image_raw's name and camera info" in node._topics_doubt, is_told)
+            self.assertEqual("/left/image_raw and /right/image_raw's name and camera info" in node._topics_warning, is_told)
 
 
 class Odometry(unittest.TestCase):

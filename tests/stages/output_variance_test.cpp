@@ -16,14 +16,14 @@ namespace {
 using testing::kNone;
 constexpr float kUntouched = -77;
 
-std::vector<float> output_variance(shared::ImageSize size, const std::vector<float>& given_out,
+std::vector<float> output_variance(shared::ImageSize size, const std::vector<float>& output,
                                    const testing::HostMaps& in, const testing::HostMaps& measured_in,
                                    const OutputVarianceOptions& options, int pixels = 0, Views views = Views::kBoth) {
   ocl::Context context(testing::any_device());
   OutputVariance stage(context, size, options, pixels);
   const StereoMaps maps = testing::upload(context, size, in), measured = testing::upload(context, size, measured_in);
   Map variance = testing::on_device(context, in.variance.size(), kUntouched);
-  stage.compute(testing::on_device(context, given_out), maps, measured, variance, views);
+  stage.compute(testing::on_device(context, output), maps, measured, variance, views);
   const testing::HostMaps after = testing::download(context, maps);
   EXPECT_EQ(after.disparity, in.disparity);
   EXPECT_EQ(after.variance, testing::masked(in).variance);
@@ -43,20 +43,20 @@ TEST_P(OutputVarianceTest, EqualsReference) {
   for (const double holes : {0.0, 0.3, 0.98}) {
     const testing::HostMaps belief = testing::random_maps(size, -40, 90, holes, 7);
     const testing::HostMaps measured = testing::random_maps(size, -40, 90, 0.3, 8);
-    std::vector<float> given_out = belief.disparity;
-    for (std::size_t i = 0; i < given_out.size(); i += 3) given_out[i] = kNone;
+    std::vector<float> output = belief.disparity;
+    for (std::size_t i = 0; i < output.size(); i += 3) output[i] = kNone;
     for (const OutputVarianceOptions& options : {OutputVarianceOptions{}, {.enabled = false}}) {
-      const std::vector<float> expected = reference::output_variance(size, options, given_out, belief, measured);
+      const std::vector<float> expected = reference::output_variance(size, options, output, belief, measured);
       for (const int pixels : {1, 16}) {
         EXPECT_TRUE(
-            testing::same_bits(output_variance(size, given_out, belief, measured, options, pixels), expected, size))
+            testing::same_bits(output_variance(size, output, belief, measured, options, pixels), expected, size))
             << holes << " holes, enabled " << options.enabled << ", by " << pixels;
       }
     }
   }
 }
 
-/// What is given out for a sum of squares.
+/// What is published for a sum of squares.
 float given_for(float sum) {
   return 0.36f * sum * sum / (sum * sum + 0.07f) + 2.52f * std::pow(sum, 5.5f) / (std::pow(sum, 5.0f) + 0.8f);
 }
@@ -176,12 +176,12 @@ TEST(OutputVariance, IsTheFiltersWhereTheOptionsSaySo) {
             (std::vector<float>{1, 0, 0, 0, 5, 0}));
 }
 
-TEST(OutputVariance, RestsOnABeliefThatIsNotGivenOut) {
+TEST(OutputVariance, RestsOnABeliefThatIsNotPublished) {
   const testing::HostMaps belief{{5, 5, 5, 5, 5, kNone, kNone, kNone, kNone, kNone}, std::vector<float>(10, 0.25f)};
-  std::vector<float> given_out(10, kNone);
-  given_out[4] = 5;
+  std::vector<float> output(10, kNone);
+  output[4] = 5;
   const OutputVarianceOptions only_filter{.scale = 1, .roughness_weight = 0, .jump_weight = 0};
-  EXPECT_FLOAT_EQ(output_variance({5, 1}, given_out, belief, belief, only_filter)[4], given_for(0.125f));
+  EXPECT_FLOAT_EQ(output_variance({5, 1}, output, belief, belief, only_filter)[4], given_for(0.125f));
 }
 
 TEST(OutputVariance, KnowsNoSumThatIsTooSmallOrTooLarge) {

@@ -34,11 +34,11 @@ class StageChain {
       look(step, plan, uploaded, frame);
       spoil_scratch();
     };
-    const FrameResults results = method_.frame(plan, uploaded, before_, after_, transfer_.given_out());
+    const FrameResults results = method_.frame(plan, uploaded, before_, after_, transfer_.output());
     frame.result = download(context_, after_.maps);
     frame.evidence = after_.evidence.read(context_);
-    frame.given_out = results.given_out.disparity.read(context_);
-    frame.output_variance = results.given_out.variance.read(context_);
+    frame.output = results.output.disparity.read(context_);
+    frame.output_variance = results.output.variance.read(context_);
     std::swap(before_, after_);
     return frame;
   }

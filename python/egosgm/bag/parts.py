@@ -13,7 +13,7 @@ _NO_PROFILE = "Profile"  # what rosbags says of an MCAP that does not call its m
 
 
 class Parts:
-    """What a reader of rosbags is given for a bag. Copies of what has to be mended first lie in a folder of their own while this is there."""
+    """What a reader of rosbags is given for a bag. Copies of what has to be repaired first lie in a folder of their own while this is there."""
 
     def __init__(self, path: pathlib.Path, highlevel: Any, typesys: Any) -> None:
         self._path, self._highlevel, self._typesys = path, highlevel, typesys

@@ -251,9 +251,9 @@ def find(file: "_Path | Sequence[_Path]", unit_m: Optional[float] = None, is_fis
     found = _in_unit(found, 1.0 if unit_m is None else unit_m)
     baseline_m = float(np.linalg.norm(found.T))
     if unit_m is None and math.isfinite(baseline_m) and baseline_m > 1e-3:
-        doubt = _egosgm._suspect_baseline(baseline_m, 0.0)
-        if doubt and doubt.is_certain:
-            raise parts.refuse(path, f"T gives {doubt.what}: {doubt.remedy} Give --unit cm or --unit mm (unit_m 0.01 or 0.001), whichever it is; the side of a square in metres where T "
+        warning = _egosgm._suspect_baseline(baseline_m, 0.0)
+        if warning and warning.is_certain:
+            raise parts.refuse(path, f"T gives {warning.what}: {warning.remedy} Give --unit cm or --unit mm (unit_m 0.01 or 0.001), whichever it is; the side of a square in metres where T "
                                 "counts a board's squares (--unit 0.025, unit_m 0.025); or --unit m (unit_m 1) where it is right")
     calibration = _without_rectification(found)
     if calibration is not None:

@@ -88,14 +88,14 @@ class EgosgmNode(LifecycleNode):
         self._is_active = self._is_configured = False
         self._count = self._replaced = self._lost_on_the_way = self._frames_told = 0
         self._lost_told = [0, 0]
-        self._problem = self._doubt = ""
+        self._problem = self._warning = ""
         self._tf: Optional[TfMotion] = None
         self._broadcaster: Any = None
         self._last_stamp: Optional[int] = None
         self._report: Optional[egosgm.FrameReport] = None
         self._latency_ms = 0.0
         self._suspicion, self._suspicion_told = "", False
-        self._topics_doubt = ""
+        self._topics_warning = ""
         self._told_at = time.monotonic()
         self._warned_at: Dict[str, float] = {}
         self._waits_since = self._told_at  # for a pair
@@ -175,13 +175,13 @@ class EgosgmNode(LifecycleNode):
         self._waits_since = time.monotonic()
         topics = " ".join(subscription.topic_name for subscription in self._inputs)
         self.get_logger().info(f"active: waits for {topics} ({'reliable' if self._value('reliable') else 'best effort'})")
-        self._topics_doubt = self._doubt_of(*(subscription.topic_name for subscription in self._inputs[1::2]))
-        if self._topics_doubt:
-            self.get_logger().warning(self._topics_doubt)
+        self._topics_warning = self._warning_of(*(subscription.topic_name for subscription in self._inputs[1::2]))
+        if self._topics_warning:
+            self.get_logger().warning(self._topics_warning)
         return super().on_activate(state)
 
     @staticmethod
-    def _doubt_of(left: str, right: str) -> str:
+    def _warning_of(left: str, right: str) -> str:
         """What speaks against two topics of images."""
         if is_named_rect(left) == is_named_rect(right):
             return ""
@@ -261,20 +261,20 @@ class EgosgmNode(LifecycleNode):
             self._cameras, self._made_for = cameras, infos  # last: where one cannot be made, all are made for the next pair
             self._last_stamp = self._path.motion = None
             raw = [topic.topic_name for info, topic in zip(infos, self._inputs[1::2]) if are_raw(info, topic.topic_name)]
-            if raw and not self._topics_doubt:
-                self._topics_doubt = (f"by {' and '.join(raw)}'s name and camera info, which has a distortion or a rotation, it is not rectified: remap both "
+            if raw and not self._topics_warning:
+                self._topics_warning = (f"by {' and '.join(raw)}'s name and camera info, which has a distortion or a rotation, it is not rectified: remap both "
                                       "cameras' image_rect to rectified images")
-                self.get_logger().warning(self._topics_doubt)
+                self.get_logger().warning(self._topics_warning)
         images = grey_of(left), grey_of(right)
         for side, image in zip(SIDES, images):
             if image.shape != (self._cameras.size[1], self._cameras.size[0]):
                 raise ValueError(f"{side}/image_rect: an image of {image.shape[1]}x{image.shape[0]} px, while the camera info is of "
                                  f"{self._cameras.size[0]}x{self._cameras.size[1]}")
         stamp, previous = stamp_ns(left), self._last_stamp
-        self._doubt = ""
+        self._warning = ""
         if stamp == previous:
-            self._doubt = f"pairs of one stamp, {stamp / 1e9:.3f} s, which tells nothing of what belongs together or moved: let the driver stamp each image"
-            self._warn("stamp", self._doubt)
+            self._warning = f"pairs of one stamp, {stamp / 1e9:.3f} s, which tells nothing of what belongs together or moved: let the driver stamp each image"
+            self._warn("stamp", self._warning)
         if previous is not None and stamp <= previous:  # a bag that starts over
             self._pipeline.reset()
             self._odometry.reset()
@@ -301,9 +301,9 @@ class EgosgmNode(LifecycleNode):
     def _look_at_input(self, images: Any, report: egosgm.FrameReport) -> None:
         """What is nearer than the range, and what else speaks against the images or their calibration."""
         options = self._pipeline.options
-        doubt = egosgm._egosgm._Doubt(self._cameras.calibration, options["min_disparity"], options["disparities"])
-        doubt.add(*images, report, True)
-        self._suspicion = doubt.text().replace("--disparities ", "disparities:=")
+        check = egosgm._egosgm._InputCheck(self._cameras.calibration, options["min_disparity"], options["disparities"])
+        check.add(*images, report, True)
+        self._suspicion = check.text().replace("--disparities ", "disparities:=")
         if self._suspicion and not self._suspicion_told:
             self.get_logger().warning(self._suspicion)
             self._suspicion_told = True
@@ -314,7 +314,7 @@ class EgosgmNode(LifecycleNode):
         try:
             return self._tf.between(frame_id, previous, stamp) if previous is not None else None
         except LookupError as error:
-            self._doubt = f"{error}; such frames are searched whole"
+            self._warning = f"{error}; such frames are searched whole"
             return None
 
     def _certain(self, depth: Any, variance: Any, maps: egosgm.Frame) -> Any:
@@ -382,10 +382,10 @@ class EgosgmNode(LifecycleNode):
             status.message = "not active"
         elif losses:
             status.level, status.message = DiagnosticStatus.WARN, "; ".join(losses)
-        elif self._doubt:
-            status.level, status.message = DiagnosticStatus.WARN, self._doubt
-        elif self._topics_doubt or self._suspicion:
-            status.level, status.message = DiagnosticStatus.WARN, self._topics_doubt or self._suspicion
+        elif self._warning:
+            status.level, status.message = DiagnosticStatus.WARN, self._warning
+        elif self._topics_warning or self._suspicion:
+            status.level, status.message = DiagnosticStatus.WARN, self._topics_warning or self._suspicion
         values = {"rate_hz": f"{rate:.2f}", "frames": str(self._count), "replaced": str(self._replaced), "lost_on_the_way": str(self._lost_on_the_way)}
         if self._is_active:
             values["listened_to"] = " ".join(sorted(self._listened_to()))

@@ -25,18 +25,18 @@ struct Suspicion {
 /// where it is not known. Thread-safe.
 EGOSGM_EXPORT std::optional<Suspicion> suspect_baseline(double baseline_m, double fx = 0);
 
-/// Doubts a calibration, also for a focal length or a principal point that does not fit images of `size`, where that is
-/// known. Thread-safe.
+/// Suspects a calibration, also for a focal length or a principal point that does not fit images of `size`, where that
+/// is known. Thread-safe.
 EGOSGM_EXPORT std::optional<Suspicion> suspect_calibration(const Calibration& calibration, Size size);
 
-/// Doubts about a run's input once it is matched: a mean density below a half (maps of good input keep four
+/// Checks a run's input once it is matched: a mean density below a half (maps of good input keep four
 /// fifths and more), no motion in most frames that have one before them, mosaics, images of 16 bits that hold 8, rows
-/// that are farther apart than the vertical alignment mends, a camera that stands still while the other one does not,
-/// one camera's images on both sides, what is nearer than the range, a suspected calibration.
-class EGOSGM_EXPORT Doubt {
+/// that are farther apart than the vertical alignment corrects, a camera that stands still while the other one does
+/// not, one camera's images on both sides, what is nearer than the range, a suspected calibration.
+class EGOSGM_EXPORT InputCheck {
  public:
   /// `calibration`: none where the images came without one, so that there is no motion either.
-  Doubt(const std::optional<Calibration>& calibration, const PipelineOptions& options)
+  InputCheck(const std::optional<Calibration>& calibration, const PipelineOptions& options)
       : calibration_(calibration), least_(options.min_disparity), end_(least_ + options.disparities) {}
 
   /// The next frame's images, both kU8 or both kU16, what the pipeline said of it, and whether it had a motion.

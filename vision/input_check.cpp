@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "vision/doubt.h"
+#include "vision/input_check.h"
 
 #include <algorithm>
 #include <cmath>
@@ -113,7 +113,7 @@ std::optional<Suspicion> suspect_calibration(const Calibration& c, Size size) {
   return std::nullopt;
 }
 
-void Doubt::add(const Image& left, const Image& right, const FrameReport& report, bool has_motion) {
+void InputCheck::add(const Image& left, const Image& right, const FrameReport& report, bool has_motion) {
   if (frames_ % kFramesPerLook == 0) {
     const std::optional<Clipped> clipped = clipped_by_range(left, right, least_, end_);
     if (clipped && (!clipped_ || clipped->share > clipped_->share)) clipped_ = clipped;
@@ -134,7 +134,7 @@ void Doubt::add(const Image& left, const Image& right, const FrameReport& report
   if (frames_++ > 0 && calibration_ && !has_motion) ++without_motion_;
 }
 
-std::string Doubt::text() const {
+std::string InputCheck::text() const {
   std::string text;
   if (frames_ == 0) return text;
   const double density = density_ / static_cast<double>(frames_);
@@ -145,7 +145,7 @@ std::string Doubt::text() const {
     append(text, "the images are mosaics of colour sensors (Bayer: convert them to grey first)");
   if (narrow_ == frames_) append(text, "values of 8 bits in images of 16");
   if (2 * far_rows_ > frames_) {
-    append(text, formatted("rows of the two views lie %g px apart, the most that is mended, or farther",
+    append(text, formatted("rows of the two views lie %g px apart, the most that is corrected, or farther",
                            static_cast<double>(EGOSGM_MAX_OFFSET_PX)));
   }
   if (same_ == frames_) append(text, "the left and the right images are the same (give those of both cameras)");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "vision/pose_doubt.h"
+#include "vision/pose_check.h"
 
 #include <algorithm>
 #include <array>
