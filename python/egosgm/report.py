@@ -15,6 +15,7 @@ import PIL.Image
 
 from . import _egosgm
 from .arguments import counted, expect_new_file, Parser, read_json, tell, text_argument, whole_number
+from .moving_objects import ObjectPictures
 
 _PICTURES = 6
 _MOST_FRAMES = 2_000_000  # as many rows as a text of poses may have
@@ -27,7 +28,7 @@ _FIGURES = ("bad_or_missing", "bad_1px", "bad_of_valid", "density", "interpolate
 def _parser() -> Parser:
     parser = Parser("report", description="Make one HTML page of a run: pictures, charts, path, options",
                     epilog="The page holds everything that it shows: it needs no network and no other file. Variance and the width of the\n"
-                    "search are shown where the run wrote them: egosgm run --write variance,search")
+                    "search are shown where the run wrote them, and so is what moves by itself: egosgm run --write variance,search,objects")
     add = parser.add_argument
     add("run", metavar="OUT", help="the folder that `egosgm run` wrote")
     add("positional_truth", metavar="TRUTH", nargs="?", help="what --truth takes")
@@ -224,6 +225,7 @@ class _Page:
 
     def _pictures(self) -> Dict[str, Any]:
         pictures, bars = [], {}
+        moving = ObjectPictures(self._folder, self._run["calibration"])
         for frame in self._shown():
             layers = []
             for name, picture, bar in self._panels.layers(self._folder, frame.name, frame.left, frame.truth):
@@ -231,6 +233,9 @@ class _Page:
                 layers.append({"name": name, "picture": _data_uri(_narrowed(picture, self._given.picture_width), "png" if has_edges else "jpeg")})
                 if bar is not None:
                     bars[name] = _data_uri(bar, "png")
+            what_moves = moving.picture(frame.name, frame.left)
+            if what_moves is not None:
+                layers.append({"name": "what moves", "picture": _data_uri(_narrowed(what_moves, self._given.picture_width), "jpeg")})
             pictures.append({"frame": frame.number, "name": frame.name, "layers": layers,
                              "values": _Values(self._folder, frame.name, self._given.picture_width).json})
         if not self._frames[0].left:

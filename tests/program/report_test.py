@@ -107,6 +107,22 @@ class Report(ReportTest):
         self.assert_refused(["report", self.out, "--frames", "some"], "FIRST:LAST")
         self.assert_refused(["report", self.out, "--frames", "1:2", "--pictures", "3", "--out", self.folder / "never.html"], "--pictures", "from 1 to 2")
 
+    def test_what_moves_is_a_layer(self):
+        street, out = self.new_folder() / "street", self.new_folder() / "out"
+        self.assert_works("synth", "--out", street, "--frames", 3, "--width", 480, "--height", 180, "--seed", 3, "--moving-object", "--quiet")
+        self.assert_works("run", street, "--poses", street / "poses.txt", "--out", out, "--write", "objects", "--quiet", "--disparities", 64)
+        self.assert_works("report", out)
+        pictures = self.data(out / "report.html")["pictures"]
+        self.assertEqual([[layer["name"] for layer in picture["layers"]] for picture in pictures],
+                         [["left image", "disparity", "what moves"]] * 2 + [["left image", "disparity"]])
+        shown = pictures[1]["layers"]
+        self.assertNotEqual(shown[0]["picture"], shown[2]["picture"])
+
+        with open(out / "objects.csv", "a") as table:
+            table.write("000001,one\n")
+        (out / "report.html").unlink()
+        self.assert_refused(["report", out], "objects.csv: is damaged")
+
     def test_pictures_of_all_layers(self):
         data = self.data(self.page)
         self.assertEqual([picture["frame"] for picture in data["pictures"]], list(range(FRAMES)))  # fewer than six
