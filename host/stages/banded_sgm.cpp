@@ -164,8 +164,7 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
       row_interpolation_(context, size_),
       no_ranks_(context, 1) {
   if (follows_paths(context, options.scheduling)) {
-    paths_.emplace(context, size_, range, options,
-                   group ? *group : BandedSgmPaths::default_group(context, range, options.cost));
+    paths_.emplace(context, size_, range, options, group ? *group : BandedSgmPaths::default_group(context, range));
   } else {
     wavefront_.emplace(context, size_, range, options, tile,
                        views_at_once(context, launches, sum_bytes(size_, chunks_of(range, tile), 1)));

@@ -9,13 +9,13 @@
 namespace egosgm {
 namespace {
 
-// Stages of kernels/sgm/banded_sgm_paths.cl.
-constexpr int kStraight = 0;
-constexpr int kDiagonals[] = {1, 2};
-
 // Disparities of a work-item at once: where work-items are lanes of a GPU, and where they hold vectors.
 constexpr int kQuad = 4, kVector = 16;
-constexpr int kGroupSize = 32;
+/// On GPUs: lanes of a path, whose quads hold the band of nine in ten predicted pixels, and a group that fills the
+/// largest unit of scheduling (a wavefront of CDNA).
+constexpr int kLanes = 8, kGroupSize = 64;
+/// The local memory that a group's costs may take, half of what OpenCL promises; 16 bits each, of two pixels a line.
+constexpr int kLocalBytes = 16 << 10, kCostBytes = 2 * 2;
 
 int groups_of(int lines, int lines_a_group) { return (lines + lines_a_group - 1) / lines_a_group; }
 
@@ -36,14 +36,13 @@ ocl::Defines defines(const ocl::Context& context, shared::DisparityRange range, 
 
 }  // namespace
 
-BandedSgmPaths::Group BandedSgmPaths::default_group(const ocl::Context& context, shared::DisparityRange range,
-                                                    MatchingCost cost) {
+BandedSgmPaths::Group BandedSgmPaths::default_group(const ocl::Context& context, shared::DisparityRange range) {
   if (!is_gpu(context)) return {1, 1};
   const int limit = static_cast<int>(std::min<std::size_t>(context.max_work_group_size(), kGroupSize));
   const int quads = SearchBand::max_chunks(range) * EGOSGM_LANES / kQuad;
-  const int quads_a_lane = Census::words(cost) == 1 ? 2 : 1;
-  int lanes = std::min(2, limit);
-  while (quads_a_lane * lanes < quads && 2 * lanes <= limit) lanes *= 2;
+  int lanes = 1;
+  while (lanes < std::min(quads, kLanes) && 2 * lanes <= limit) lanes *= 2;
+  while (2 * lanes <= limit && limit / lanes * quads * kQuad * kCostBytes > kLocalBytes) lanes *= 2;
   return {lanes, limit / lanes};
 }
 
@@ -75,24 +74,21 @@ BandedSgmPaths::BandedSgmPaths(ocl::Context& context, shared::ImageSize size, sh
       follow_paths_(stage_, "follow_paths"),
       find_winners_(stage_, "find_winners") {}
 
-void BandedSgmPaths::follow(int stage, const shared::SgmParameters& parameters, const MatchInputs& inputs,
-                            Views views) {
-  const int groups = stage == kStraight
-                         ? groups_of(stage_.size().height, group_.lines) + groups_of(stage_.size().width, group_.lines)
-                         : groups_of(stage_.size().width + stage_.size().height - 1, group_.lines);
+void BandedSgmPaths::follow(int pass, const shared::SgmParameters& parameters, const MatchInputs& inputs, Views views) {
+  const auto [width, height] = stage_.size();
+  const int diagonals = width + height - 1;
+  const int first_lines = pass == 0 ? height : width, second_lines = paths_ == 8 ? diagonals : width;
+  const int groups = groups_of(first_lines, group_.lines) + groups_of(second_lines, group_.lines);
   const int work_items = group_.lanes * group_.lines;
   const ocl::Range lines{cl::NDRange(work_items, groups, 2 * count(views)), cl::NDRange(work_items, 1, 1)};
   const cl_int view_count = count(views);
-  stage_.launch(follow_paths_, lines, parameters, stage, view_count, inputs.codes, inputs.penalties, inputs.bands.bands,
+  stage_.launch(follow_paths_, lines, parameters, pass, view_count, inputs.codes, inputs.penalties, inputs.bands.bands,
                 inputs.bands.cell_offsets, forward_first_, forward_second_, backward_first_, backward_second_);
 }
 
 void BandedSgmPaths::match(const shared::SgmParameters& parameters, const MatchInputs& inputs, StereoMaps& measured,
                            ocl::Buffer<cl_uint>& ranks, Views views) {
-  follow(kStraight, parameters, inputs, views);
-  if (paths_ == 8) {
-    for (const int diagonal : kDiagonals) follow(diagonal, parameters, inputs, views);
-  }
+  for (int pass = 0; pass < paths_ / 4; ++pass) follow(pass, parameters, inputs, views);
   const int work_items = group_.lanes * group_.lines;
   const int groups_a_row = groups_of(stage_.size().width, group_.lines);
   const ocl::Range pixels{

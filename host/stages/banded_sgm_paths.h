@@ -28,9 +28,9 @@ class BandedSgmPaths {
   void match(const shared::SgmParameters& parameters, const MatchInputs& inputs, StereoMaps& measured,
              ocl::Buffer<cl_uint>& ranks, Views views);
 
-  /// On GPUs two quads of disparities a lane (one, where codes of 64 bits take the registers), and a group that fills
-  /// the smallest unit, as far as the device allows it; elsewhere a work-item.
-  static Group default_group(const ocl::Context& context, shared::DisparityRange range, MatchingCost cost);
+  /// On GPUs eight lanes of four disparities, as many as a predicted pixel's band holds, and a group of 64, as far as
+  /// the device allows it; elsewhere a work-item.
+  static Group default_group(const ocl::Context& context, shared::DisparityRange range);
   /// The size of one of the four buffers of partial sums: a byte a cell, and the lanes of a pixel's last vector beyond
   /// its band.
   static std::size_t sum_bytes(const ocl::Context& context, shared::ImageSize size, shared::DisparityRange range);
@@ -44,7 +44,7 @@ class BandedSgmPaths {
   using Sums = ocl::Buffer<cl_uchar>;
   using Maps = ocl::Buffer<float>;
 
-  void follow(int stage, const shared::SgmParameters& parameters, const MatchInputs& inputs, Views views);
+  void follow(int pass, const shared::SgmParameters& parameters, const MatchInputs& inputs, Views views);
 
   ocl::Stage stage_;
   const int paths_;

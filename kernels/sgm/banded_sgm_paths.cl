@@ -2,12 +2,12 @@
 // Semi-global matching in a band per pixel, the way for GPUs: LANES work-items follow a path across the image, LINES
 // paths a work-group. The same bits as banded_sgm.cl, whose head explains the recurrence and the sums.
 //
-// Work-items that share a path hold its costs in registers (path_together.h), with a barrier a pixel of each of the
-// LINES paths. Costs come from the codes; there is no cost volume.
+// Work-items that share a path deal out the band of each pixel, with a barrier a pixel of each of the LINES paths
+// (path_together.h). Costs come from the codes; there is no cost volume.
 //
-// Three launches: horizontal and vertical paths, one diagonal, the other; forward and backward ones together. They do
-// to a cell's partial sums: first = L0, second = L1; first = mean(first, second), second = L2; first += mean(second,
-// L3).
+// Forward and backward paths of two directions run together. Of four, these are horizontal and vertical ones: they
+// leave L0 in `first` and L1 in `second`. Eight take two passes: horizontal and falling ones, then vertical and rising
+// ones, which leave mean(L0, L1) in `first` and mean(L2, L3) in `second`.
 #include "sgm_cells.h"
 
 // lint: MAX_CHUNKS=8 PATHS=4 CODE_BYTES=8 COST_SCALE=1 COST_SAD=0 LANES=8 LINES=4 VECTOR=16 PIXELS=1
@@ -39,42 +39,41 @@
 #endif
 
 #define VECTORS ((MAX_CHUNKS * EGOSGM_LANES + VECTOR - 1) / VECTOR)
-#define VECTORS_A_LANE ((VECTORS + LANES - 1) / LANES)
-// A cost that is absent: less the largest minimum (254), it still exceeds the largest P2 (190) and what 8 bits hold.
+// A cost that is absent: it exceeds the largest P2 (190) and what 8 bits hold by more than the largest minimum (254).
 #define ABSENT 511
 
 #include "path.h"
 #include "path_sums.h"
 #include "path_together.h"
 
-// Group ids 1 and 2: the lines, LINES at a time; views, and after them the same views backward.
+// Group ids 1 and 2: the lines of the pass's two directions, LINES at a time; views, and after them the same views
+// backward.
 KERNEL __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void follow_paths(
-    const SgmParameters q, const int stage, const int views, global const uint* codes, global const uchar* penalties,
+    const SgmParameters q, const int pass, const int views, global const uint* codes, global const uchar* penalties,
     global const Band* bands, global const uint* offsets, global uchar* forward_first, global uchar* forward_second,
     global uchar* backward_first, global uchar* backward_second) {
   const int line = get_local_id(0) / LANES;
   const bool backward = (int)get_group_id(2) >= views;
   const int view = (int)get_group_id(2) - (backward ? views : 0);
 
-  const int group = get_group_id(1), row_groups = (q.height + LINES - 1) / LINES;
-  const bool vertical = stage == 0 && group >= row_groups;
-  const int direction = stage > 0 ? stage + 1 : vertical ? 1 : 0;
-  const int first_line = (vertical ? group - row_groups : group) * LINES;
+  const int group = get_group_id(1), groups_of_first = ((pass == 0 ? q.height : q.width) + LINES - 1) / LINES;
+  const bool is_second = group >= groups_of_first;
+  const int direction = pass + (is_second ? PATHS / 4 : 0);
+  const int first_line = (is_second ? group - groups_of_first : group) * LINES;
   const int rows = rows_of(q, view);
   const Path path = path_of(q, direction, backward, view, line_of(q.width, rows, direction, first_line + line));
   const Pixels pixels = {(global const Code*)codes, penalties, bands, offsets};
-  const Sums sums = {stage, vertical, backward ? backward_first : forward_first,
-                     backward ? backward_second : forward_second};
+  global uchar* const first = backward ? backward_first : forward_first;
+  global uchar* const second = backward ? backward_second : forward_second;
+  const Sums sums = {is_second ? second : first, pass > 0};
   const int lane = get_local_id(0) % LANES;
-  // Each vector's first cost and, in the upper 16 bits, its last; of this pixel and of the one before.
-  local uint edges[2][LINES][SLOT];
+  // Of this pixel and of the one before.
+  local Totals kept[2][LINES][VECTORS];
   local uint minima[2][LINES][MINIMA];
-  for (int i = lane; i < SLOT; i += LANES) edges[0][line][i] = edges[1][line][i] = ABSENT << 16 | ABSENT;
-  barrier(CLK_LOCAL_MEM_FENCE);
   int longest = 0;
   _Pragma("unroll 1") for (int i = 0; i < LINES; ++i) longest =
       max(longest, line_of(q.width, rows, direction, first_line + i).length);
-  follow_together(q, path, longest, lane, pixels, sums, edges[0][line], minima[0][line]);
+  follow_together(q, path, longest, lane, pixels, sums, kept[0][line], minima[0][line]);
 }
 
 // Offers ranks to right pixels: that of lane i to the one i before `seen`.

@@ -42,8 +42,8 @@ typedef struct {
   short4 band;
 } Stored;
 
-// A pixel on it: P2 of the step to it, which lanes of the range its band holds, [first, end), none beyond the end of
-// the path, and where the cell of the range's first lane would be.
+// A pixel on it: P2 of the step to it, which lanes of the range its band holds, [first, end), none (0, 0) beyond the
+// end of the path, and where the cell of the range's first lane would be.
 typedef struct {
   int p2;
   int first, end;
@@ -113,9 +113,8 @@ static inline Stored stored_at(const Path path, const int i, const Pixels pixels
 static inline Pixel pixel_of(const SgmParameters q, const Path path, const int i, const Stored stored) {
   const uint at = path.pixel + i * path.pixel_step;
   const uint row_start = at - (path.x + i * path.x_step);
-  const int first = stored.band.x - q.min_disparity;
-  const Pixel pixel = {stored.p2, first,
-                       i < path.length ? min(first + (ushort)stored.band.y * EGOSGM_LANES, q.disparities) : 0,
+  const int first = i < path.length ? stored.band.x - q.min_disparity : 0;
+  const Pixel pixel = {stored.p2, first, min(first + (ushort)stored.band.y * EGOSGM_LANES, q.disparities),
                        (long)cells_of(row_start, at, stored.offset) - first_cell_of(first)};
   return pixel;
 }
@@ -123,10 +122,12 @@ static inline Pixel pixel_of(const SgmParameters q, const Path path, const int i
 #define PLAIN_SUM(a, b) ((a) + (b))
 
 // The costs of VECTOR disparities from `at` on: the matching costs and the least way from those of the pixel before
-// (`same`, `behind` by one disparity, `ahead`), which are less their least. Absent outside of the band.
+// (`same`, `behind` by one disparity, `ahead`), from all of which `least`, their least, is still to be taken off.
+// Absent outside of the band.
 static inline Costs path_costs(const SgmParameters q, const Pixel pixel, const int at, const Costs matching,
-                               const Costs same, const Costs behind, const Costs ahead) {
-  const Costs costs = matching + LEAST_WAY(same, behind, ahead, (Costs)(q.p1), (Costs)(pixel.p2), min, PLAIN_SUM);
+                               const Costs same, const Costs behind, const Costs ahead, const int least) {
+  const Costs way = LEAST_WAY(same, behind, ahead, (Costs)(q.p1), (Costs)(pixel.p2 + least), min, PLAIN_SUM);
+  const Costs costs = matching + way - (Costs)(least);
   return are_below((Costs)(at - pixel.first) + (Costs)(INDEX), pixel.end - pixel.first) ? costs : (Costs)(ABSENT);
 }
 

@@ -8,38 +8,15 @@
 #define MAX_STEPS 8
 #define NO_WINNER 0xffffffffu
 
-// The place where a launch leaves the costs of its paths. `stage` 0: horizontal (and `vertical`) paths, 1 and 2: the
-// diagonals.
+// The place where a path leaves its costs: alone, or as their mean with those of the path that left its own there.
 typedef struct {
-  int stage;
-  bool vertical;
-  global uchar *first, *second;
+  global uchar* of_cells;
+  bool joins;
 } Sums;
 
-// The sums that lie in a vector of cells already.
-typedef struct {
-  Bytes first, second;
-} Earlier;
-
-static inline Earlier earlier_at(const Sums sums, const long cell) {
-  Earlier earlier = {0, 0};
-  if (sums.stage > 0) {
-    earlier.first = load(sums.first + cell);
-    earlier.second = load(sums.second + cell);
-  }
-  return earlier;
-}
-
-static inline void add_path(const Sums sums, const Earlier earlier, const Costs costs, const long cell) {
+static inline void add_path(const Sums sums, const Bytes earlier, const Costs costs, const long cell) {
   const Bytes bytes = BYTES_OF(min(costs, (Costs)(255)));
-  if (sums.stage == 0) {
-    store(bytes, (sums.vertical ? sums.second : sums.first) + cell);
-  } else if (sums.stage == 1) {
-    store(mean(earlier.first, earlier.second), sums.first + cell);
-    store(bytes, sums.second + cell);
-  } else {
-    store(saturated_sum(earlier.first, mean(earlier.second, bytes)), sums.first + cell);
-  }
+  store(sums.joins ? mean(earlier, bytes) : bytes, sums.of_cells + cell);
 }
 
 // The partial sums of a pixel's cells, and which of them exist, [first, end).
@@ -50,11 +27,8 @@ typedef struct {
 
 // Half the sums over all paths, of a vector of cells.
 static inline Totals totals_of(const Cells cells, const int at) {
-  Bytes forward = load(cells.forward_first + at), backward = load(cells.backward_first + at);
-#if PATHS == 4
-  forward = saturated_sum(forward, load(cells.forward_second + at));
-  backward = saturated_sum(backward, load(cells.backward_second + at));
-#endif
+  const Bytes forward = saturated_sum(load(cells.forward_first + at), load(cells.forward_second + at));
+  const Bytes backward = saturated_sum(load(cells.backward_first + at), load(cells.backward_second + at));
   return TOTALS_OF(forward) + TOTALS_OF(backward);
 }
 
@@ -68,12 +42,8 @@ static inline Ranks allowed_of(const Cells cells, const int at, const int first,
 
 // The total of one.
 static inline int total_of(const Cells cells, const int at) {
-  uchar forward = cells.forward_first[at], backward = cells.backward_first[at];
-#if PATHS == 4
-  forward = add_sat(forward, cells.forward_second[at]);
-  backward = add_sat(backward, cells.backward_second[at]);
-#endif
-  return (int)forward + backward;
+  return (int)add_sat(cells.forward_first[at], cells.forward_second[at]) +
+         add_sat(cells.backward_first[at], cells.backward_second[at]);
 }
 
 // Steps to one side of the winner until the sums above its own add up to `limit`.

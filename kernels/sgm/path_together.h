@@ -1,54 +1,69 @@
 // SPDX-License-Identifier: Apache-2.0
-// LANES work-items that follow a path (banded_sgm_paths.cl). Disparities are dealt out in vectors: vector k of the
-// range belongs to lane k % LANES, whatever the band, which may begin and end within one. So a lane keeps the costs of
-// its vectors in registers from pixel to pixel, gives its neighbours only the first and the last of each, and asks the
-// others for nothing but the minimum. OpenCL C only.
+// LANES work-items that follow a path (banded_sgm_paths.cl). They deal out the vectors of each pixel's band, of which
+// one that is wider than LANES vectors takes rounds. A pixel's costs lie in local memory for the next one, whose lanes
+// read theirs and the two beside. OpenCL C only.
 #ifndef EGOSGM_KERNELS_MATCH_PATH_TOGETHER_H
 #define EGOSGM_KERNELS_MATCH_PATH_TOGETHER_H
 
 #include "path.h"
 #include "path_sums.h"
 
-#define SLOT (VECTORS_A_LANE * LANES + 2)
-
-#if VECTORS_A_LANE <= 8
-#define UNROLLED _Pragma("unroll")
-#else
-#define UNROLLED
-#endif
-
 // Up to this many lanes each read the minima of all, after one barrier; with more, a few lanes read eight each before
 // it.
 #define AT_ONCE 16
 #define MINIMA (LANES <= AT_ONCE ? LANES : 2 * LANES)
 
-// Inputs of a pixel: its code, those of what it may match (with COST_SAD the costs themselves), and what lies in its
-// cells.
+// The code of a pixel, and those of a vector that it may match (with COST_SAD the costs themselves).
 typedef struct {
   Code own;
-  Codes others[VECTORS_A_LANE];
-  Earlier earlier[VECTORS_A_LANE];
+  Codes others;
 } Matches;
 
-static inline bool holds(const Pixel pixel, const int vector) {
-  return VECTOR * vector + VECTOR > pixel.first && VECTOR * vector < pixel.end;
-}
+// Costs of the pixel before: its vectors [first, end), and their least cost.
+typedef struct {
+  local const Totals* costs;
+  int first, end;
+  int least;
+} Before;
 
-static inline Matches fetch(const SgmParameters q, const Path path, const int i, const Pixel pixel, const int lane,
-                            const Pixels memory, const Sums sums) {
-  Matches matches;
-  global const Code* own = memory.codes + (path.own + i * path.own_step);
-  matches.own = pixel.end > 0 ? own[0] : 0;
-  UNROLLED for (int v = 0; v < VECTORS_A_LANE; ++v) {
-    const int vector = lane + v * LANES;
-    matches.others[v] = 0;
-    if (holds(pixel, vector)) {
-      global const Code* other = memory.codes + (path.other + i * path.other_step + VECTOR * vector);
-      matches.others[v] = fetch_vector(q, own, other, path.y + i * path.y_step);
-      matches.earlier[v] = earlier_at(sums, pixel.cells + VECTOR * vector);
-    }
+// The vectors of a pixel are [first_vector_of, end_vector_of).
+static inline int first_vector_of(const Pixel pixel) { return pixel.first / VECTOR; }
+static inline int end_vector_of(const Pixel pixel) { return (pixel.end + VECTOR - 1) / VECTOR; }
+
+static inline bool has(const Pixel pixel, const int vector) { return VECTOR * vector < pixel.end; }
+
+static inline Matches fetch(const SgmParameters q, const Path path, const int i, const Pixel pixel, const int vector,
+                            const Pixels memory) {
+  Matches matches = {0, 0};
+  if (has(pixel, vector)) {
+    global const Code* own = memory.codes + (path.own + i * path.own_step);
+    global const Code* other = memory.codes + (path.other + i * path.other_step + VECTOR * vector);
+    matches.own = own[0];
+    matches.others = fetch_vector(q, own, other, path.y + i * path.y_step);
   }
   return matches;
+}
+
+// The path costs that a vector of cells holds already.
+static inline Bytes fetch_earlier(const Pixel pixel, const int vector, const Sums sums) {
+  return sums.joins && has(pixel, vector) ? load(sums.of_cells + pixel.cells + VECTOR * vector) : (Bytes)(0);
+}
+
+static inline bool holds(const Before before, const int vector) {
+  return vector >= before.first && vector < before.end;
+}
+
+// The costs of a vector, with its pixel's least not taken off.
+static inline Costs costs_of_vector(const SgmParameters q, const Pixel pixel, const int vector, const Matches matches,
+                                    const Before before) {
+  local const ushort* kept = (local const ushort*)(before.costs + vector);
+  Costs same = ABSENT;
+  int below = ABSENT, above = ABSENT;
+  if (holds(before, vector)) same = COSTS_OF(before.costs[vector]);
+  if (holds(before, vector - 1)) below = kept[-1];
+  if (holds(before, vector + 1)) above = kept[VECTOR];
+  return path_costs(q, pixel, VECTOR * vector, cost_of(matches.own, matches.others), same, BEHIND(below, same),
+                    AHEAD(same, above), before.least);
 }
 
 // The least value of a line's lanes, by one barrier or more for all work-items of the group. `minima`: MINIMA values,
@@ -71,45 +86,63 @@ static inline uint minimum_of_line(local uint* minima, const int lane, const uin
   return least;
 }
 
-// `edges`, `minima`: those of the first of two pixels; LINES lines on lie those of the second.
+// A pixel of the path with what is loaded ahead for the lane: its first vector, and what lies there.
+typedef struct {
+  Pixel pixel;
+  int vector;
+  Matches matches;
+  Bytes earlier;
+} Inputs;
+
+static inline Inputs inputs_of(const SgmParameters q, const Path path, const int i, const Stored stored, const int lane,
+                               const Pixels memory, const Sums sums) {
+  Inputs inputs;
+  inputs.pixel = pixel_of(q, path, i, stored);
+  inputs.vector = first_vector_of(inputs.pixel) + lane;
+  inputs.matches = fetch(q, path, i, inputs.pixel, inputs.vector, memory);
+  inputs.earlier = fetch_earlier(inputs.pixel, inputs.vector, sums);
+  return inputs;
+}
+
+// Keeps the costs of pixel `i` in `after`, and gives them for the next one.
+static inline Before follow_pixel(const SgmParameters q, const Path path, const int i, const Inputs inputs,
+                                  const Before before, const int lane, const Pixels memory, const Sums sums,
+                                  local Totals* after, local uint* minima) {
+  const Pixel pixel = inputs.pixel;
+  const int vector = inputs.vector;
+  const Costs costs = costs_of_vector(q, pixel, vector, inputs.matches, before);
+  Costs lowest = costs;
+  if (has(pixel, vector)) after[vector] = TOTALS_OF(costs);
+  _Pragma("unroll 1") for (int v = vector + LANES; has(pixel, v); v += LANES) {
+    const Costs further = costs_of_vector(q, pixel, v, fetch(q, path, i, pixel, v, memory), before);
+    after[v] = TOTALS_OF(further);
+    lowest = min(lowest, further);
+  }
+  const int least = minimum_of_line(minima, lane, least_cost(lowest));
+  if (has(pixel, vector)) add_path(sums, inputs.earlier, costs - (Costs)(least), pixel.cells + VECTOR * vector);
+  _Pragma("unroll 1") for (int v = vector + LANES; has(pixel, v); v += LANES) {
+    add_path(sums, fetch_earlier(pixel, v, sums), COSTS_OF(after[v]) - (Costs)(least), pixel.cells + VECTOR * v);
+  }
+  const Before done = {after, first_vector_of(pixel), end_vector_of(pixel), least};
+  return done;
+}
+
+// `kept`, `minima`: those of pixels of even numbers; LINES lines on lie those of odd ones.
 static inline void follow_together(const SgmParameters q, const Path path, const int longest, const int lane,
-                                   const Pixels memory, const Sums sums, local uint* edges, local uint* minima) {
-  Costs costs[VECTORS_A_LANE];
-  UNROLLED for (int v = 0; v < VECTORS_A_LANE; ++v) costs[v] = ABSENT;
+                                   const Pixels memory, const Sums sums, local Totals* kept, local uint* minima) {
   // A pixel's inputs are loaded while the one before is under way, its band one pixel earlier still, and nobody waits
   // for it before then.
-  Pixel pixel = pixel_of(q, path, 0, stored_at(path, 0, memory));
+  Inputs even = inputs_of(q, path, 0, stored_at(path, 0, memory), lane, memory, sums);
   Stored stored = stored_at(path, 1, memory);
-  Matches matches = fetch(q, path, 0, pixel, lane, memory, sums);
-  int least = 0;
-  for (int i = 0; i < longest; ++i) {
-    local const uint* before = edges + (i + 1) % 2 * (LINES * SLOT);
-    local uint* after = edges + i % 2 * (LINES * SLOT);
-    Costs lowest = ABSENT;
-    UNROLLED for (int v = 0; v < VECTORS_A_LANE; ++v) {
-      const int vector = lane + v * LANES;
-      if (holds(pixel, vector)) {
-        const Costs behind = BEHIND((int)(before[vector] >> 16) - least, costs[v]),
-                    ahead = AHEAD(costs[v], (int)(before[vector + 2] & 0xffff) - least);
-        costs[v] =
-            path_costs(q, pixel, VECTOR * vector, cost_of(matches.own, matches.others[v]), costs[v], behind, ahead);
-      } else {
-        costs[v] = ABSENT;
-      }
-      after[vector + 1] = (uint)LAST(costs[v]) << 16 | (uint)costs[v].s0;
-      lowest = v == 0 ? costs[v] : min(lowest, costs[v]);
-    }
-    const Pixel next = pixel_of(q, path, i + 1, stored);
-    const Matches of_next = fetch(q, path, i + 1, next, lane, memory, sums);
+  Before before = {kept, 0, 0, 0};
+  for (int i = 0; i < longest; i += 2) {
+    const Inputs odd = inputs_of(q, path, i + 1, stored, lane, memory, sums);
     stored = stored_at(path, i + 2, memory);
-    least = minimum_of_line(minima + i % 2 * (LINES * MINIMA), lane, least_cost(lowest));
-    UNROLLED for (int v = 0; v < VECTORS_A_LANE; ++v) {
-      const int vector = lane + v * LANES;
-      costs[v] -= (Costs)(least);
-      if (holds(pixel, vector)) add_path(sums, matches.earlier[v], costs[v], pixel.cells + VECTOR * vector);
-    }
-    matches = of_next;
-    pixel = next;
+    before = follow_pixel(q, path, i, even, before, lane, memory, sums, kept, minima);
+    even = inputs_of(q, path, i + 2, stored, lane, memory, sums);
+    stored = stored_at(path, i + 3, memory);
+    before =
+        follow_pixel(q, path, i + 1, odd, before, lane, memory, sums, kept + LINES * VECTORS, minima + LINES * MINIMA);
   }
 }
 
