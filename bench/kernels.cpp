@@ -138,6 +138,7 @@ int run(int argc, char** argv) {
     for (const auto& [name, value] : {std::pair{"min_add_g_s", roofs.min_add_g_s},
                                       {"popcount_g_s", roofs.popcount_g_s},
                                       {"launch_us", roofs.launch_us},
+                                      {"enqueue_us", roofs.enqueue_us},
                                       {"local_gb_s", roofs.local_gb_s},
                                       {"barrier_ns", roofs.barrier_ns}}) {
       machine.more.emplace_back(name, value);

@@ -26,7 +26,7 @@ import tempfile
 SOURCE = pathlib.Path(__file__).resolve().parents[1]
 COSTS = SOURCE / "kernels/costs.json"
 ROOFS = {"copy_gb_s": "copy, GB/s", "min_add_g_s": "minima and additions of 16 bits, G/s", "popcount_g_s": "bit counts of 32 bits, G/s",
-         "launch_us": "launch, us", "local_gb_s": "local memory, GB/s", "barrier_ns": "barrier, ns"}
+         "launch_us": "launch, us", "enqueue_us": "launch for the host, us", "local_gb_s": "local memory, GB/s", "barrier_ns": "barrier, ns"}
 CACHES = ("POCL_CACHE_DIR", "CUDA_CACHE_PATH", "NEO_CACHE_DIR", "MESA_SHADER_CACHE_DIR", "EGOSGM_CACHE")  # of drivers, and ours
 
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <vector>
 
 #include "host/ocl/buffer.h"
 
@@ -53,26 +54,31 @@ kernel void wait_for_all(const int turns, global uint* out) {
 )";
 constexpr std::size_t kElements = std::size_t{16} << 20;  // of 16 bytes
 constexpr int kRounds = 10, kTurns = 500, kLaunches = 100;
-constexpr std::size_t kItems = 4096, kGroup = 64;
-constexpr double kValues = 8 * 16.0 * kItems * kTurns;
+constexpr std::size_t kGroup = 64;
+constexpr double kValuesOfAnItem = 8 * 16.0 * kTurns;
 
-/// The least seconds of `f`, but for the first call, which pays what only comes once.
+/// The least of the seconds that `f` returns, but for the first call, which pays what only comes once.
 template <typename F>
 double least_s(F&& f) {
   double least = 1e9;
   for (int round = 0; round < kRounds; ++round) {
-    const auto start = std::chrono::steady_clock::now();
-    f();
-    const double s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const double s = f();
     if (round > 0) least = std::min(least, s);
   }
   return least;
 }
 
+std::size_t units_of(const ocl::Context& context) { return context.device().getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>(); }
+
+bool is_gpu(const ocl::Context& context) { return context.device().getInfo<CL_DEVICE_TYPE>() == CL_DEVICE_TYPE_GPU; }
+
+/// Work-items that keep every unit busy: a GPU's hides what an item waits for behind the others of its unit.
+std::size_t items_of(const ocl::Context& context) { return is_gpu(context) ? 2048 * units_of(context) : 4096; }
+
 class Kernels {
  public:
   explicit Kernels(ocl::Context& context)
-      : context_(context), program_(context.get(), kKernels), values_(context, 16 * kItems) {
+      : context_(context), items_(items_of(context)), program_(context.get(), kKernels), values_(context, 16 * items_) {
     // CLHPP builds by itself for OpenCL C 2.0, which not every driver has.
     program_.build("-cl-std=CL1.2");
     context.enter("roofs");
@@ -85,34 +91,55 @@ class Kernels {
     cl::Kernel copy(program_, "copy");
     copy.setArg(0, from.get());
     copy.setArg(1, to.get());
-    return 2.0 * sizeof(cl_uint4) * kElements * 1e-9 / least_s([&] { run(copy, kElements, kGroup); });
+    return 2.0 * sizeof(cl_uint4) * kElements * 1e-9 / least_s([&] { return run(copy, kElements, kGroup); });
   }
-  double values_g_s(const char* name, double each) { return each * kValues * 1e-9 / turns_s(name, 1); }
-  double turns_s(const char* name, std::size_t group, std::size_t local_bytes = 0) {
+  /// 10^9 values a second, `each` of them a turn.
+  double values_g_s(const char* name, double each) {
+    return each * kValuesOfAnItem * static_cast<double>(items_) * 1e-9 / turns_s(name, 1, items_);
+  }
+  double turns_s(const char* name, std::size_t group, std::size_t items, std::size_t local_bytes = 0) {
     cl::Kernel kernel(program_, name);
     kernel.setArg(0, cl_int{kTurns});
     kernel.setArg(1, values_.get());
     if (local_bytes > 0) kernel.setArg(2, local_bytes, nullptr);
-    return least_s([&] { run(kernel, kItems, group); });
+    return least_s([&] { return run(kernel, items, is_gpu(context_) ? kGroup : group); });
   }
   double launch_us() {
     cl::Kernel nothing(program_, "nothing");
     nothing.setArg(0, values_.get());
-    return 1e6 / kLaunches * least_s([&] { run(nothing, kGroup, kGroup, kLaunches); });
+    return 1e6 / kLaunches * least_s([&] { return run(nothing, kGroup, kGroup, kLaunches); });
   }
+  double enqueue_us() {
+    cl::Kernel nothing(program_, "nothing");
+    nothing.setArg(0, values_.get());
+    return 1e6 / kLaunches * least_s([&] {
+             const auto start = std::chrono::steady_clock::now();
+             run(nothing, kGroup, kGroup, kLaunches);
+             return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+           });
+  }
+  std::size_t items() const { return items_; }
 
  private:
-  void run(const cl::Kernel& kernel, std::size_t items, std::size_t group, int launches = 1) {
-    for (int i = 0; i < launches; ++i) {
-      cl::Event done;
+  /// Seconds on the device.
+  double run(const cl::Kernel& kernel, std::size_t items, std::size_t group, int launches = 1) {
+    std::vector<cl::Event> done(launches);
+    for (cl::Event& each : done) {
       context_.queue().enqueueNDRangeKernel(kernel, cl::NullRange, cl::NDRange(items), cl::NDRange(group), nullptr,
-                                            &done);
-      context_.record(done, "roof");
+                                            &each);
+      context_.record(each, "roof");
     }
     context_.wait();
+    double ns = 0;
+    for (const cl::Event& each : done) {
+      ns += static_cast<double>(each.getProfilingInfo<CL_PROFILING_COMMAND_END>() -
+                                each.getProfilingInfo<CL_PROFILING_COMMAND_START>());
+    }
+    return 1e-9 * ns;
   }
 
   ocl::Context& context_;
+  const std::size_t items_;
   cl::Program program_;
   ocl::Buffer<cl_uint> values_;
 };
@@ -126,15 +153,13 @@ Roofs roofs_of(ocl::Context& context) {
   Roofs roofs{.copy_gb_s = kernels.copy_gb_s(),
               .min_add_g_s = kernels.values_g_s("min_add", 2),
               .popcount_g_s = kernels.values_g_s("count_bits", 1),
-              .launch_us = kernels.launch_us()};
-  if (context.device().getInfo<CL_DEVICE_TYPE>() != CL_DEVICE_TYPE_GPU) return roofs;
-  const double turns = kTurns * static_cast<double>(kItems);
-  const std::size_t groups = kItems / kGroup, units = context.device().getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>();
-  roofs.local_gb_s =
-      2 * sizeof(cl_uint) * turns * 1e-9 / kernels.turns_s("rotate_local", kGroup, kGroup * sizeof(cl_uint));
-  // Groups of one unit may wait side by side: the time is that of one after another.
-  roofs.barrier_ns =
-      1e9 * kernels.turns_s("wait_for_all", kGroup) / kTurns / static_cast<double>((groups + units - 1) / units);
+              .launch_us = kernels.launch_us(),
+              .enqueue_us = kernels.enqueue_us()};
+  if (!is_gpu(context)) return roofs;
+  const double turns = kTurns * static_cast<double>(kernels.items());
+  roofs.local_gb_s = 2 * sizeof(cl_uint) * turns * 1e-9 /
+                     kernels.turns_s("rotate_local", kGroup, kernels.items(), kGroup * sizeof(cl_uint));
+  roofs.barrier_ns = 1e9 * kernels.turns_s("wait_for_all", kGroup, kGroup * units_of(context)) / kTurns;
   return roofs;
 }
 

@@ -9,12 +9,14 @@ namespace egosgm::bench {
 /// memory can reach on this device. The best of nine.
 double copy_gb_s(ocl::Context& context);
 
-/// What a device reaches at most, each by a small kernel that does nothing else. The best of some rounds.
+/// What a device reaches at most, each by a small kernel that does nothing else, by the device's clock. The best of
+/// some rounds.
 struct Roofs {
   double copy_gb_s = 0;
   double min_add_g_s = 0;   // additions and minima of 16 bits, 10^9 a second
   double popcount_g_s = 0;  // counts of the bits of 32, 10^9 a second
-  double launch_us = 0;     // a kernel that does nothing, one of many, each with an event
+  double launch_us = 0;     // a kernel that does nothing
+  double enqueue_us = 0;    // one of many of these, each with an event, by the host's clock
   // Of work-groups, on GPUs; else 0.
   double local_gb_s = 0;  // local memory read and written
   double barrier_ns = 0;

@@ -1,3 +1,4 @@
+#!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """Moving pictures of two runs. The left image and both runs' colours, beside each other, or above where they are wide."""
 import pathlib

@@ -57,6 +57,13 @@ class Pages(ProgramTest):
         for page, option in of_pages(r"`(--[a-z][a-z-]*)"):
             self.assertIn(option, known, page)
 
+    def test_what_lines_of_a_shell_run_may_be_run(self):
+        lines = "\n".join(line for text in PAGES.values() for line in re.findall(r"^```(?:sh|console|bash)\n(.*?)^```", text, re.MULTILINE | re.DOTALL))
+        programs = {word for word in re.findall(rf"^((?:{FOLDERS})/[\w./-]+)", lines, re.MULTILINE) if (SOURCE / word).is_file()}
+        self.assertGreater(len(programs), 5)
+        for program in sorted(programs):
+            self.assertTrue(os.access(SOURCE / program, os.X_OK) and (SOURCE / program).read_bytes().startswith(b"#!"), f"{program} is not executable")
+
     def test_extras_exist_and_are_not_asked_of_the_index(self):
         there = set(re.findall(r"^(\w+) = \[", (SOURCE / "pyproject.toml").read_text().split("[project.optional-dependencies]")[1], re.MULTILINE))
         for page, (package, extra) in of_pages(r'pip install "([\w./*-]+)\[(\w+)\]'):
