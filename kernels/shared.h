@@ -146,6 +146,7 @@ typedef struct {
   i32 keep_predicted;
   i32 has_evidence;  // else what the frame knows of evidence is not read, and all that lives is confirmed
   i32 repeats;       // the images are those of the frame before, which make nobody surer
+  i32 sees_again;    // the camera stands: what has no prediction was turned down a frame before
 } KalmanParameters;
 
 // The motion of a view's disparity space (eqs. 1-4): rows 1, 2 and 4 of H = Gamma T Gamma^-1; row 3 is (0, 0, 1, 0).
@@ -159,7 +160,7 @@ typedef struct {
 #ifdef __cplusplus
 static_assert(sizeof(ImageSize) == 8 && sizeof(DisparityRange) == 8 && sizeof(Band) == 8 && sizeof(RowSum) == 8 &&
                   sizeof(BlockRange) == 12 && sizeof(EvidenceSum) == 8 && sizeof(SgmParameters) == 52 &&
-                  sizeof(KalmanParameters) == 28 && sizeof(DisparityMotion) == 84,
+                  sizeof(KalmanParameters) == 32 && sizeof(DisparityMotion) == 84,
               "kernels/*.cl read these layouts");
 }  // namespace egosgm::shared
 #endif

@@ -74,6 +74,21 @@ TEST(Plan, DecidesEveryCase) {
   }
 }
 
+TEST(Plan, KnowsACameraThatStands) {
+  const auto sees_again = [](const MethodOptions& options, double moved_m) {
+    Motion motion;
+    motion.current_from_previous.translation().x() = moved_m;
+    return plan_of(options, {}, true, motion, {}).sees_again;
+  };
+  MethodOptions options;
+  EXPECT_TRUE(sees_again(options, 0));
+  EXPECT_TRUE(sees_again(options, 1e-7)) << "poses are rounded";
+  EXPECT_FALSE(sees_again(options, 1e-4));
+  EXPECT_FALSE(plan_of(options, {}, true, {}, {}).sees_again) << "nobody knows";
+  options.coarse_match.enabled = false;
+  EXPECT_FALSE(sees_again(options, 0)) << "a pixel could not begin any more";
+}
+
 TEST(Plan, MatchesTwiceWhereTheFirstMatchGivesTheVerticalOffset) {
   MethodOptions options;
   EXPECT_EQ(plan_of(options, kFirstFrame, false, {}, {}).matches, 2);

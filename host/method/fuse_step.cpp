@@ -29,7 +29,7 @@ void FuseStep::update(const Plan& plan, const Matched& matched, const Prediction
     (*evidence_)(matched.codes, matched.coarse, prediction.maps.disparity, measured.disparity, fusion.evidence,
                  plan.tracked);
   }
-  const KalmanUpdate::FrameEvidence of_frame{prediction.evidence, fusion.evidence, plan.repeats};
+  const KalmanUpdate::FrameEvidence of_frame{prediction.evidence, fusion.evidence, plan.repeats, plan.sees_again};
   kalman_update_.update(prediction.hidden, prediction.maps, measured, evidence_ ? &of_frame : nullptr, fused,
                         fusion.doubtful, after.evidence, plan.tracked);
   if (median_filter_) median_filter_->fill(fusion.fused, fusion.smoothed, belief.variance, plan.tracked);

@@ -4,6 +4,9 @@
 namespace egosgm {
 namespace {
 
+// In metres and radians: by less, no pixel moves.
+constexpr double kStands = 1e-6;
+
 std::optional<Unpredicted> why_not(const MethodOptions& options, std::optional<Unpredicted> why_no_belief,
                                    const std::optional<Motion>& motion) {
   if (!options.temporal) return Unpredicted::kNotTemporal;
@@ -27,6 +30,7 @@ Plan plan_of(const MethodOptions& options, std::optional<Unpredicted> why_no_bel
   plan.matches = options.vertical_alignment.enabled && !knows_offset ? 2 : 1;
   plan.has_coarse_match = searches_bands && options.coarse_match.enabled;
   plan.repeats = repeats;
+  plan.sees_again = plan.has_coarse_match && motion->current_from_previous.matrix().isIdentity(kStands);
   plan.wanted = wanted;
   return plan;
 }

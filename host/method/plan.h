@@ -24,6 +24,7 @@ struct Plan {
   int matches;         // 2 where the first one gives the vertical offset
   bool has_coarse_match;
   bool repeats;         // the images are those of the frame before
+  bool sees_again;      // the camera stands, and bands hide most of the range from a pixel without a prediction
   float grey_step = 1;  // GreyLevels::step of the images
   Wanted wanted;
 

@@ -17,7 +17,8 @@ KalmanUpdate::KalmanUpdate(ocl::Context& context, shared::ImageSize size, const 
                   .min_variance_px2 = options.min_variance_px2,
                   .keep_predicted = options.keep_predicted,
                   .has_evidence = false,
-                  .repeats = false},
+                  .repeats = false,
+                  .sees_again = false},
       ask_neighbours_(options.ask_neighbours),
       blocks_(CoarseMatch::coarse_size(size)),
       sums_(context, 2 * static_cast<std::size_t>(EGOSGM_EVIDENCE_STRIDE(size.width)) * blocks_.height),
@@ -43,6 +44,7 @@ void KalmanUpdate::update(const FlagMap& hidden, const StereoMaps& predicted, co
   shared::KalmanParameters parameters = parameters_;
   parameters.has_evidence = evidence != nullptr;
   parameters.repeats = evidence && evidence->repeats;
+  parameters.sees_again = evidence && evidence->sees_again;
   stage_.launch(update_, ocl::every_pixels(stage_.enter(), stage_.size(), stage_.pixels(), count(views)), parameters,
                 hidden, predicted.disparity, predicted.variance, measured.disparity, measured.variance,
                 evidence ? evidence->before : hidden, blocks.evidence, blocks.found, drifts_, updated.disparity,

@@ -19,6 +19,7 @@ class KalmanUpdate {
     const FlagMap& before;        // that moved with the prediction
     const BlockEvidence& blocks;  // of this frame's images
     bool repeats;                 // they are those of the frame before, and make nobody surer
+    bool sees_again;              // the camera stands: what has no prediction was turned down a frame before
   };
 
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.

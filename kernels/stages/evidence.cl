@@ -309,7 +309,7 @@ COMPILED_ONCE void publish_row(const WorkItem at, const ImageSize size, const in
     Ints is_given = (d > INVALID) & (of_pixels >= (asks_left ? EGOSGM_EVIDENCE_CONFIRMED : EGOSGM_EVIDENCE_TRUSTED));
     if (!asks_left) {
       const size_t view = row - left_row;
-      is_given |= have_supporters(size, x, at.y, (d > INVALID) & !is_given, EGOSGM_SUPPORTERS_COUNT, d,
+      is_given |= have_supporters(size, x, at.y, (d > INVALID) & !is_given, (Ints)(EGOSGM_SUPPORTERS_COUNT), d,
                                   EGOSGM_SAME_SURFACE_PX, disparity + view, evidence + view);
     }
     store_pixels(is_given ? d : INVALID, published + row, x, width);

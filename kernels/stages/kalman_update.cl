@@ -10,6 +10,9 @@
 // Evidence (evidence.cl) decides what lives: a pixel's evidence is a sum over frames that moves with the map. Below 0
 // the pixel dies, whatever was predicted or measured. A measurement without evidence moves no prediction, and lowers no
 // variance.
+//
+// A camera that stands sees the same mismatches in every frame. What has no prediction was turned down a frame before,
+// over a wider range than the band's: it begins where the coarse match found it, and many around are measured alike.
 #include "method.h"
 #include "pixels.h"
 #include "supporters.h"
@@ -148,7 +151,8 @@ static inline Verdict judged(const KalmanParameters* q, const Ints before, const
   const Ints is_old = has_prediction & (Ints)(q->repeats ? -1 : 0);
   sums = is_old ? before : sums;
   Verdict verdict;
-  verdict.lives = (has_prediction | has_measurement) & (sums >= 0);
+  const Ints may_begin = has_prediction | is_found | (Ints)(q->sees_again ? 0 : -1);
+  verdict.lives = (has_prediction | has_measurement) & (sums >= 0) & (may_begin != 0);
   verdict.sums = verdict.lives ? sums : (Ints)(0);
   verdict.counts = (!stays & !falls_back) | (stays & (now >= EGOSGM_EVIDENCE_OF_NOISE));
   verdict.counts = is_old ? (Ints)(0) : verdict.counts;
@@ -156,14 +160,16 @@ static inline Verdict judged(const KalmanParameters* q, const Ints before, const
 }
 
 // Drops of a chunk's measurements those that neither a prediction nor a measurement around shares.
-static inline void drop_lone(const ImageSize size, const int start, const int y, const float gate,
+static inline void drop_lone(const ImageSize size, const int start, const int y, const KalmanParameters* q,
                              global const float* predicted_row, global const float* measured, Floats* chunk) {
+  const float gate = q->gate_px;
+  const Ints to_begin = q->sees_again ? EGOSGM_SUPPORTERS_COUNT : EGOSGM_SUPPORTERS_LEAST;
   FOR_BLOCKS(x, i, start, size.width) {
     const Floats d = load_pixels(predicted_row, x, size.width), z = chunk[i];
     const Ints is_shared = (d > INVALID) & (fabs(z - d) <= gate);
     const Ints is_new = (z > INVALID) & !is_shared;
-    const Ints is_lone =
-        is_new & !have_supporters(size, x, y, is_new, EGOSGM_SUPPORTERS_LEAST, z, EGOSGM_LONE_PX, measured, 0);
+    const Ints enough = d > INVALID ? (Ints)(EGOSGM_SUPPORTERS_LEAST) : to_begin;
+    const Ints is_lone = is_new & !have_supporters(size, x, y, is_new, enough, z, EGOSGM_LONE_PX, measured, 0);
     chunk[i] = is_lone ? INVALID : z;
   }
 }
@@ -187,7 +193,7 @@ COMPILED_ONCE void update_row(const WorkItem at, const KalmanParameters q, globa
   FOR_CHUNKS(start, width) {
     Floats taken[CHUNK];
     FOR_BLOCKS(x, i, start, width) taken[i] = load_pixels(measured + row, x, width);
-    if (q.has_evidence) drop_lone(size, start, y, q.gate_px, predicted + row, measured + view, taken);
+    if (q.has_evidence) drop_lone(size, start, y, &q, predicted + row, measured + view, taken);
     FOR_BLOCKS(x, i, start, width) {
       const Floats d = load_pixels(predicted + row, x, width);
       const Floats z = taken[i];

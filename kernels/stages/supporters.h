@@ -8,7 +8,7 @@
 
 // Which pixels of `asked` have `enough` others on a grid around that differ from d by at most `most`. Where there is
 // `evidence`, those count that are confirmed. No row is asked once all have enough: that decides nearly everywhere.
-static inline Ints have_supporters(const ImageSize size, const int x, const int y, const Ints asked, const int enough,
+static inline Ints have_supporters(const ImageSize size, const int x, const int y, const Ints asked, const Ints enough,
                                    const Floats d, const float most, global const float* disparity,
                                    global const uchar* evidence) {
   Ints supporters = 0;
@@ -25,7 +25,7 @@ static inline Ints have_supporters(const ImageSize size, const int x, const int 
       if (evidence) counts &= load_bytes(evidence + row, u, size.width) >= EGOSGM_EVIDENCE_CONFIRMED;
       supporters += counts ? (Ints)(1) : (Ints)(0);
     }
-    lacks = asked & (supporters < (Ints)(enough));
+    lacks = asked & (supporters < enough);
   }
   return asked & !lacks;
 }

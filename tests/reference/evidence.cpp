@@ -137,6 +137,7 @@ Verdict judge(shared::ImageSize size, float gate_px, const FrameEvidence& frame,
   const int match = stays ? seen_by_other(view, x, predicted) : x;
   if (match < 0 || match >= size.width) return {before * 58 / 64, true, now >= kEvidenceOfNoise};
   const bool is_found = is_valid(found) && std::abs(found - measured) <= kSide;
+  if (frame.sees_again && !is_valid(predicted) && !is_found) return {0, false, true};
   const int start = stays ? before * 45 / 64 : is_found ? 0 : -kEvidenceOfChoice;
   const int evidence = std::min(start + now - kEvidenceOfNoise, kMostEvidence);
   if (evidence < 0 && !stays && is_valid(predicted)) {  // what has no evidence contradicts nothing

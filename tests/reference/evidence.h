@@ -35,7 +35,7 @@ BlockEvidence block_evidence(float gate_px, const ViewCodes& codes, const std::o
 struct FrameEvidence {
   std::vector<std::uint8_t> before;  // that moved with the prediction
   BlockEvidence blocks;
-  bool repeats = false;
+  bool repeats = false, sees_again = false;
 };
 
 /// The evidence of a pixel after a frame [1/16 bit], whether it lives, and whether its measurement counts.

@@ -74,7 +74,7 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
     frame.vertical_offset_px = known.terms_px[0];
     frame.passes.push_back(match(images, frame, known));
   }
-  if (has_prediction) update(images, frame);
+  if (has_prediction) update(images, motions->stand, frame);
 
   frame.result = has_prediction ? frame.updated : frame.passes.back().measured;
   frame.evidence = has_prediction ? frame.fused.evidence
@@ -199,7 +199,7 @@ Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOff
   return pass;
 }
 
-void Pipeline::update(const Images& images, Frame& frame) const {
+void Pipeline::update(const Images& images, bool stands, Frame& frame) const {
   const Pass& pass = frame.passes.back();
   std::optional<FrameEvidence> evidence;
   if (has_evidence()) {
@@ -208,7 +208,7 @@ void Pipeline::update(const Images& images, Frame& frame) const {
     evidence = FrameEvidence{
         frame.warped.evidence,
         block_evidence(options_.kalman_update.gate_px, pass.view_codes, coarse, frame.predicted, pass.measured),
-        images.greys == greys_};
+        images.greys == greys_, stands && coarse.has_value()};
     frame.block_evidence = evidence->blocks.evidence;
   }
   frame.fused =

@@ -21,10 +21,11 @@ struct Images {
   int bits = 8;
 };
 
-/// How the disparity spaces of both views move.
+/// How the disparity spaces of both views move, and whether they stand.
 struct ViewMotions {
   shared::DisparityMotion left, right;
   shared::DisparityMotion left_back;  // moves the left view back to the frame before
+  bool stand = false;
 };
 
 /// A matching pass: of the resampled images, in their bands, and what each stage left of it.
@@ -66,7 +67,7 @@ class Pipeline {
  private:
   void predict(const ViewMotions& motions, Frame& frame) const;
   Pass match(const Images& images, const Frame& frame, const VerticalOffset& known) const;
-  void update(const Images& images, Frame& frame) const;
+  void update(const Images& images, bool stands, Frame& frame) const;
   bool has_evidence() const;
   std::vector<std::uint8_t> explain(const Images& images, const Frame& frame) const;
 

@@ -31,7 +31,8 @@ testing::HostMaps update(shared::ImageSize size, const KalmanUpdateOptions& opti
     blocks.evidence.write(context, testing::in_padded_rows(size, evidence->blocks.evidence));
     blocks.found.write(context, testing::in_padded_rows(size, evidence->blocks.found));
   }
-  const KalmanUpdate::FrameEvidence of_frame{before, blocks, evidence && evidence->repeats};
+  const KalmanUpdate::FrameEvidence of_frame{before, blocks, evidence && evidence->repeats,
+                                             evidence && evidence->sees_again};
   stage.update(hidden, prediction, measurement, evidence ? &of_frame : nullptr, out, doubtful, after, views);
   testing::HostMaps maps = testing::download(context, out);
   maps.doubtful = doubtful.read(context);
@@ -89,7 +90,7 @@ TEST_P(KalmanUpdateTest, EqualsReference) {
 }
 
 /// Of which nothing is hidden, and all that is asked has an answer.
-reference::FrameEvidence random_evidence(shared::ImageSize size, unsigned seed, bool repeats) {
+reference::FrameEvidence random_evidence(shared::ImageSize size, unsigned seed, bool repeats, bool sees_again) {
   std::mt19937 random(seed);
   reference::FrameEvidence evidence;
   for (std::size_t i = 0; i < 2 * pixel_count(size); ++i) {
@@ -100,7 +101,7 @@ reference::FrameEvidence random_evidence(shared::ImageSize size, unsigned seed, 
     evidence.blocks.evidence.push_back(static_cast<int>(random() % 240) - 80);
     evidence.blocks.found.push_back(random() % 3 == 0 ? kNone : static_cast<float>(random() % 13) - 6);
   }
-  evidence.repeats = repeats;
+  evidence.repeats = repeats, evidence.sees_again = sees_again;
   return evidence;
 }
 
@@ -108,12 +109,12 @@ TEST_P(KalmanUpdateTest, EqualsReferenceWithEvidence) {
   const shared::ImageSize size = GetParam();
   const testing::HostMaps predicted = testing::random_maps(size, -4, 4, 0.3, 16);
   testing::HostMaps measured = testing::random_maps(size, -5, 5, 0.2, 17);
-  for (const bool repeats : {false, true}) {
-    const reference::FrameEvidence evidence = random_evidence(size, 18, repeats);
+  for (const auto& [repeats, sees_again] : {std::pair{false, false}, {true, false}, {false, true}}) {
+    const reference::FrameEvidence evidence = random_evidence(size, 18, repeats, sees_again);
     const testing::HostMaps expected = reference::kalman_update(size, {}, predicted, measured, &evidence);
     for (const int pixels : {1, 16}) {
       const testing::HostMaps actual = update(size, {}, predicted, measured, pixels, Views::kBoth, &evidence);
-      EXPECT_TRUE(testing::same_maps(actual, expected, size)) << repeats << ", by " << pixels;
+      EXPECT_TRUE(testing::same_maps(actual, expected, size)) << repeats << sees_again << ", by " << pixels;
     }
   }
 }
@@ -216,14 +217,14 @@ TEST(KalmanUpdate, MovesThePredictionOfWhatMovesByItself) {
   EXPECT_EQ(Window(0.5f, 21).with(141, kNone).middle(), drifted(0, 21)) << "59 are measured";
 }
 
-/// The left pixel in the middle of 25x1, whose match lies in the image, and its evidence. `supporters`: how many of the
-/// pixels 8 and 16 px beside were measured the same.
+/// The left pixel in the middle of 25x25, whose match lies in the image, and its evidence. `supporters`: how many of
+/// the pixels 8 and 16 px around were measured the same.
 struct Pixel {
   float predicted = kNone, measured = kNone;
   std::uint8_t before = 0;
   int now = 0;
   float found = kNone;
-  bool repeats = false;
+  bool repeats = false, sees_again = false;
   int supporters = 1;
 };
 struct Judged {
@@ -233,20 +234,26 @@ struct Judged {
 };
 
 Judged judged(const Pixel& pixel, int x = 12) {
-  constexpr shared::ImageSize kRow{25, 1};
-  testing::HostMaps predicted = testing::empty_maps(kRow), measured = predicted;
-  predicted.disparity[x] = pixel.predicted, measured.disparity[x] = pixel.measured;
+  constexpr shared::ImageSize kSize{25, 25};
+  constexpr int kPixels = 25 * 25, kBlocks = 7 * 7;
+  testing::HostMaps predicted = testing::empty_maps(kSize), measured = predicted;
+  const int i = 12 * 25 + x;
+  predicted.disparity[i] = pixel.predicted, measured.disparity[i] = pixel.measured;
   int supporters = pixel.supporters;
-  for (const int away : {8, 16, -8, -16}) {
-    if (x + away >= 0 && x + away < 25 && supporters-- > 0) measured.disparity[x + away] = pixel.measured;
+  for (const int y : {12, 4, 20}) {
+    for (const int u : {x + 8, x - 8, x}) {
+      if ((u != x || y != 12) && u >= 0 && u < 25 && supporters-- > 0) measured.disparity[y * 25 + u] = pixel.measured;
+    }
   }
-  predicted.variance[x] = measured.variance[x] = 1;
-  reference::FrameEvidence evidence{std::vector<std::uint8_t>(50, 0),
-                                    {std::vector<int>(14, pixel.now), std::vector<float>(14, pixel.found)},
-                                    pixel.repeats};
-  evidence.before[x] = pixel.before;
-  const testing::HostMaps out = update(kRow, {}, predicted, measured, 0, Views::kBoth, &evidence);
-  return {{out.disparity[x], out.variance[x], out.doubtful[x] != 0}, out.evidence[x]};
+  predicted.variance[i] = measured.variance[i] = 1;
+  reference::FrameEvidence evidence{
+      std::vector<std::uint8_t>(2 * kPixels, 0),
+      {std::vector<int>(2 * kBlocks, pixel.now), std::vector<float>(2 * kBlocks, pixel.found)},
+      pixel.repeats,
+      pixel.sees_again};
+  evidence.before[i] = pixel.before;
+  const testing::HostMaps out = update(kSize, {}, predicted, measured, 0, Views::kBoth, &evidence);
+  return {{out.disparity[i], out.variance[i], out.doubtful[i] != 0}, out.evidence[i]};
 }
 
 // In sixteenths of a bit: 1.5 bits a frame must be had, 3 more by what was chosen in this frame alone.
@@ -294,6 +301,18 @@ TEST(KalmanUpdate, ARepeatedPairMakesNobodySurer) {
   EXPECT_EQ(judged({.predicted = 5, .measured = 6, .before = 64, .now = 90, .repeats = true}), (Judged{{5, 1}, 64}));
   EXPECT_EQ(judged({.measured = 6, .now = 96, .repeats = true}), (Judged{{6, 1}, 96 - 72})) << "what is new counts";
   EXPECT_EQ(judged({.predicted = 5, .measured = 9, .before = 64, .now = 90, .repeats = true}), (Judged{{5, 1}, 64}));
+}
+
+TEST(KalmanUpdate, WhereTheCameraStandsAPixelBeginsWhatIsSharedAndFoundInTheWholeRange) {
+  EXPECT_EQ(judged({.measured = 5, .now = 96, .found = 9, .sees_again = true, .supporters = 8}),
+            (Judged{{5, 1}, 96 - 24}));
+  EXPECT_EQ(judged({.measured = 5, .now = 96, .found = 9, .sees_again = true, .supporters = 7}), (Judged{kNothing, 0}));
+  EXPECT_EQ(judged({.measured = 5, .now = 160, .sees_again = true, .supporters = 8}), (Judged{kNothing, 0}))
+      << "the coarse match did not find it";
+  EXPECT_EQ(judged({.predicted = 5, .measured = 9, .before = 128, .now = 90, .sees_again = true}).evidence, 90 - 72)
+      << "what moves there contradicts a prediction";
+  EXPECT_EQ(judged({.predicted = 5, .before = 64, .now = 40, .sees_again = true}).evidence, 45 + 40 - 24)
+      << "a prediction stays";
 }
 
 TEST(KalmanUpdate, NeverClaimsMoreThanTheFloor) {

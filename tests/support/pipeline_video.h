@@ -159,7 +159,8 @@ class Video {
     Motion back;
     back.current_from_previous = scaled.current_from_previous.inverse();
     return {disparity_motion(calibration(), scaled, EGOSGM_LEFT), disparity_motion(calibration(), scaled, EGOSGM_RIGHT),
-            disparity_motion(calibration(), back, EGOSGM_LEFT)};
+            disparity_motion(calibration(), back, EGOSGM_LEFT),
+            scaled.current_from_previous.isApprox(Eigen::Isometry3d::Identity())};
   }
 
  private:
