@@ -138,6 +138,9 @@ def evidence(content):
         "have no texture, or one that repeats, in large parts. \"Gained\": what the video's map has and the single frame's has not. What is right is off by at most 3 px. "
         "[What each figure is](../use/evaluation.md#figures-of-single-frames).\n", video_table(found["places"]),
         "### One pair again and again\n\nIt brings no evidence that the first time did not bring.\n", video_table(found["repeated"]),
+        *([] if "standing" not in found else [
+            "### A camera that stands\n\nOne pair with new noise in every frame; a lens is covered in part, or a hand is nearer than the range.\n",
+            video_table(found["standing"])]),
         "### Thin poles\n\nPercent of the pixels of a pole, before a wall, that are off by at most 2 px.\n", video_table(found["poles"]),
         "### The paper's preset in such places\n\nPercent of all pixels of the last frame ([why](paper.md#where-nothing-is-seen)).\n", video_table(found["paper"])])
 

@@ -14,6 +14,7 @@ HEADINGS = ["place", "filled, first frame", "filled, last frame", "filled, singl
 PAPER, PAPER_PLACES = ("--preset", "paper"), ("sky", "corridor", "fence")
 PLAIN = ("--plain", "--frames", 10, "--height", 480, "--noise", 2, "--pole-width", 5)
 TIMES = 10  # that one pair is given
+STANDING, STANDING_NOISE, HAND_PX = {"warehouse": "forest", "kitchen": "warehouse"}, 2, 220  # what covers comes from the other video; [grey levels], [px]
 POLE_WIDTHS = {1: 3, 2: 4, 3: 6, 4: 8, 5: 14}  # [px], by the numbers in ids.npz
 POLE_PX = 2  # an error up to this: the pole is found
 
@@ -154,6 +155,55 @@ def repeated(bench, only):
     return {"headings": ["pair", "filled, first time", f"filled, time {TIMES}", "bad of valid, first time", f"bad of valid, time {TIMES}"], "rows": rows}
 
 
+def before_a_camera_that_stands(bench, name, what):
+    """One pair of a rendered video with new noise in every frame. "lens covered": another texture lies over the lower left of the right view;
+    "hand": it lies before both, nearer than the range. Where it hides a pixel's match, nothing is right."""
+    np, egosgm = numpy(), bench.video_figures().egosgm
+    source, other = (expect(bench.data / "rendered" / of) for of in (name, STANDING[name]))
+    left, right = (egosgm.read_grey(sorted((source / folder).iterdir())[4]).astype(np.float32) for folder in ("image_0", "image_1"))
+    disparity = egosgm.read_disparity(sorted((source / "truth/left_disp_noc").iterdir())[4])
+    cover = egosgm.read_grey(sorted((other / "image_1").iterdir())[4])
+    height, width = left.shape
+    rows, columns = slice(height // 3, None), slice(width // 10, width // 2)
+    hidden = np.zeros(left.shape, bool)
+    if what != "nothing":
+        right[rows, columns] = cover[rows, columns]
+        match = np.rint(np.arange(width) - disparity).astype(int)
+        hidden[rows] = (disparity[rows] > 0) & (match[rows] >= columns.start) & (match[rows] < columns.stop)
+    if what == "hand":
+        shown = slice(columns.start + HAND_PX, columns.stop + HAND_PX)
+        left[rows, shown] = cover[rows, columns]
+        hidden[rows, shown] = True
+    folder = bench.work / "evidence" / f"standing_{name}_{what}".replace(" ", "_")
+    shutil.rmtree(folder, ignore_errors=True)
+    for side in ("left", "right", "truth"):
+        (folder / side).mkdir(parents=True)
+    shutil.copy(source / "calib.txt", folder)
+    random = np.random.default_rng(1)
+    truth = np.where(hidden, np.float32(1 / 256), np.where(disparity > 0, disparity, np.float32(0)))
+    for k in range(TIMES):
+        for side, image in (("left", left), ("right", right)):
+            noisy = np.clip(image + STANDING_NOISE * random.standard_normal(image.shape), 0, 255)
+            egosgm.write_disparity(folder / side / f"{k:06d}.png", noisy.astype(np.float32))  # 16 bits: grey levels in 256ths
+        np.save(folder / f"truth/{k:06d}.npy", truth)
+    return Place(f"{name}, {what}", folder, folder / "truth", ("--disparities", 128))
+
+
+def standing_row(bench, place):
+    (out, frames), (alone, _) = run(bench, place), run(bench, place, SINGLE_FRAME)
+    first, last = (frames[i]["frame"] for i in (0, -1))
+    figures = [figures_of(bench, folder, place.truth, frame) for folder, frame in ((out, first), (out, last), (alone, last))]
+    return [place.title, *(of[name] for name in ("filled", "wrong_of_all") for of in figures)]
+
+
+def standing(bench, only):
+    """A camera that stands sees the same mismatches in every frame."""
+    titles = [(name, what) for name in STANDING for what in ("nothing", "lens covered", "hand") if only.search(f"{name}, {what}")]
+    rows = [measured(f"{name}, {what}", lambda n=name, w=what: standing_row(bench, before_a_camera_that_stands(bench, n, w))) for name, what in titles]
+    return {"headings": ["before the camera", "filled, first frame", f"filled, frame {TIMES}", "filled, single frame", "wrong of all, first frame",
+                         f"wrong of all, frame {TIMES}", "wrong of all, single frame"], "rows": rows}
+
+
 def share_found(np, disparity, truth, where):
     """Percent of the pixels whose disparity is off by at most POLE_PX."""
     return float(100 * np.mean(np.abs(disparity - truth)[where] <= POLE_PX)) if where.any() else None
@@ -200,7 +250,7 @@ def print_table(found):
 def evidence_tables(bench, only):
     """`only`: a compiled pattern of the places' titles."""
     found = {}
-    for name, measure in (("places", places), ("repeated", repeated), ("poles", poles), ("paper", paper)):
+    for name, measure in (("places", places), ("repeated", repeated), ("standing", standing), ("poles", poles), ("paper", paper)):
         found[name] = measure(bench, only)
         print_table(found[name])
     return found
