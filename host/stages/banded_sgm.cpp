@@ -76,8 +76,7 @@ struct Demand {
 Demand demand(const ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
               const BandedSgmOptions& options, int chunks) {
   const bool follows = BandedSgm::follows_paths(context, options.scheduling);
-  const std::uint64_t sums =
-      follows ? BandedSgmPaths::sum_bytes(context, size, range) : sum_bytes(size, chunks, kViews);
+  const std::uint64_t sums = follows ? BandedSgmPaths::most_sum_bytes(size, range) : sum_bytes(size, chunks, kViews);
   const std::uint64_t ranks = ReadOff::bytes(size, BandedSgm::code_padding(range));
   if (follows) return {sums, 4 * sums + ranks};
   const std::uint64_t slots = slot_bytes(size, chunks, options.paths, kViews);

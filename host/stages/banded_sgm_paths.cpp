@@ -26,6 +26,12 @@ int vector_of(const ocl::Context& context) { return is_gpu(context) ? kQuad : kV
 /// A pixel's vectors hold so many cells more than its band, which may begin and end within one.
 int spare_cells(int vector) { return vector == kQuad ? kQuad : vector + EGOSGM_LANES; }
 
+/// The size of one of the four buffers of partial sums: a byte a cell, and the lanes of a pixel's last vector beyond
+/// its band.
+std::size_t sum_bytes(shared::ImageSize size, shared::DisparityRange range, int vector) {
+  return 2 * pixel_count(size) * (SearchBand::max_chunks(range) * EGOSGM_LANES + spare_cells(vector));
+}
+
 ocl::Defines defines(const ocl::Context& context, shared::DisparityRange range, const BandedSgmOptions& options,
                      BandedSgmPaths::Group group) {
   return sgm_defines(SearchBand::max_chunks(range), Census::words(options.cost), options)
@@ -46,9 +52,8 @@ BandedSgmPaths::Group BandedSgmPaths::default_group(const ocl::Context& context,
   return {lanes, limit / lanes};
 }
 
-std::size_t BandedSgmPaths::sum_bytes(const ocl::Context& context, shared::ImageSize size,
-                                      shared::DisparityRange range) {
-  return 2 * pixel_count(size) * (SearchBand::max_chunks(range) * EGOSGM_LANES + spare_cells(vector_of(context)));
+std::size_t BandedSgmPaths::most_sum_bytes(shared::ImageSize size, shared::DisparityRange range) {
+  return sum_bytes(size, range, kVector);
 }
 
 ocl::Defines sgm_defines(int max_chunks, int code_words, const BandedSgmOptions& options) {
@@ -67,10 +72,10 @@ BandedSgmPaths::BandedSgmPaths(ocl::Context& context, shared::ImageSize size, sh
              ocl::Joins::kNo),
       paths_(options.paths),
       group_(group),
-      forward_first_(context, ocl::Scratch::kOfStage0, sum_bytes(context, size, range)),
-      forward_second_(context, ocl::Scratch::kOfStage1, sum_bytes(context, size, range)),
-      backward_first_(context, ocl::Scratch::kOfStage2, sum_bytes(context, size, range)),
-      backward_second_(context, ocl::Scratch::kOfStage3, sum_bytes(context, size, range)),
+      forward_first_(context, ocl::Scratch::kOfStage0, sum_bytes(size, range, vector_of(context))),
+      forward_second_(context, ocl::Scratch::kOfStage1, sum_bytes(size, range, vector_of(context))),
+      backward_first_(context, ocl::Scratch::kOfStage2, sum_bytes(size, range, vector_of(context))),
+      backward_second_(context, ocl::Scratch::kOfStage3, sum_bytes(size, range, vector_of(context))),
       follow_paths_(stage_, "follow_paths"),
       find_winners_(stage_, "find_winners") {}
 

@@ -31,9 +31,9 @@ class BandedSgmPaths {
   /// On GPUs eight lanes of four disparities, as many as a predicted pixel's band holds, and a group of 64, as far as
   /// the device allows it; elsewhere a work-item.
   static Group default_group(const ocl::Context& context, shared::DisparityRange range);
-  /// The size of one of the four buffers of partial sums: a byte a cell, and the lanes of a pixel's last vector beyond
-  /// its band.
-  static std::size_t sum_bytes(const ocl::Context& context, shared::ImageSize size, shared::DisparityRange range);
+  /// The size of one of the four buffers of partial sums on the device that needs the most, so that stripes, and with
+  /// them bits, depend on no device's vectors.
+  static std::size_t most_sum_bytes(shared::ImageSize size, shared::DisparityRange range);
 
  private:
   using Parameters = const shared::SgmParameters;
