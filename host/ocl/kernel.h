@@ -17,9 +17,10 @@ struct Range {
   cl::NDRange local;
 };
 
-/// A work-item a pixel and view: global ids are x, y, view. x is rounded up, so kernels guard their bounds.
+/// A work-item a pixel and view: global ids are x, y, view. x is rounded up, so kernels guard their bounds. Groups are
+/// of 128 on GPUs, some of which hold 16 groups at once and 48 warps of 32.
 inline Range every_pixel(const Context& context, shared::ImageSize size, int views = 2) {
-  std::size_t local = 64;
+  std::size_t local = context.device().getInfo<CL_DEVICE_TYPE>() == CL_DEVICE_TYPE_GPU ? 128 : 64;
   while (local > context.max_work_group_size()) local /= 2;
   return {cl::NDRange((size.width + local - 1) / local * local, size.height, views), cl::NDRange(local, 1, 1)};
 }
