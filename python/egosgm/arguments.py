@@ -54,10 +54,10 @@ def say(text: str) -> None:
         print("egosgm: " + "".join(c if c.isprintable() else " " for c in text), file=sys.stderr, flush=True)
 
 
-def tell(text: str) -> None:
+def tell(text: str, end: str = "\n") -> None:
     """On the standard output. A reader that goes has read enough."""
     try:
-        print(text, flush=True)
+        print(text, end=end, flush=True)
     except BrokenPipeError:
         pass
     except OSError as error:

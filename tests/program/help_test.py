@@ -9,7 +9,7 @@ import sys
 
 from program_case import HAS_PACKAGE, PROGRAM, SOURCE, ProgramTest, egosgm
 
-COMMANDS = ("run", "eval", "devices", "compile", "synth", "odometry", "eval-video", "eval-flow", "eval-poses", "tune", "report", "doctor", "rectify", "calibrate")
+COMMANDS = ("run", "eval", "devices", "compile", "synth", "odometry", "eval-video", "eval-flow", "eval-poses", "tune", "report", "doctor", "rectify", "calibrate", "live")
 
 
 class Help(ProgramTest):

@@ -6,6 +6,7 @@ import math
 import os
 import pathlib
 import re
+import time
 from typing import Any, Dict, Iterator, List, Optional, Sequence, Tuple
 
 from .. import _egosgm
@@ -81,12 +82,20 @@ def _names_files(pattern: str) -> bool:
     return any(mark in path.name for mark in "*%") or path.suffix.lower() in (".png", ".jpg", ".jpeg", ".mpo", *_FOREIGN)
 
 
-class _Files:
-    note = ""
+class _Source:
+    """Images of one camera, with the seconds since the first one where they are known. count: None where it is not known."""
 
+    note = ""
+    count: Optional[int] = None
+
+    def grab(self) -> None:
+        """Of a camera, takes the next image, which is decoded later: the other camera's is taken before."""
+
+
+class _Files(_Source):
     def __init__(self, pattern: str) -> None:
         self._files = _egosgm._find_images(pattern)
-        self.count: Optional[int] = len(self._files)
+        self.count = len(self._files)
         if not self._files:
             raise _refuse(f"{pattern}: no file matches")
 
@@ -94,9 +103,7 @@ class _Files:
         return (((_read_mpo if file.suffix.lower() == ".mpo" else _read_image)(file), None) for file in self._files)
 
 
-class _Video:
-    note = ""
-
+class _Video(_Source):
     def __init__(self, file: str) -> None:
         _expect_file(file)
         self._file = file
@@ -121,8 +128,48 @@ class _Video:
             self.note = f"{self._file} has {self.count} images, and only the first {number} can be read: is it cut or damaged?"
 
 
-def _open(pattern: str) -> Any:
-    return _Files(pattern) if _names_files(pattern) else _Video(pattern)
+def _device(source: str) -> str:
+    """The device that a camera's number or link names."""
+    return f"/dev/video{int(source)}" if re.fullmatch(r"[0-9]{1,3}", source) else os.path.realpath(source)
+
+
+def is_camera(source: str) -> bool:
+    """A number or a device: no video, which would keep its own time."""
+    return bool(re.match(r"/dev/(video[0-9]|v4l/)", _device(source))) and not os.path.isfile(source)
+
+
+class _Camera(_Source):
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._begin_s: Optional[float] = None
+        self._is_there: Optional[bool] = None  # None: the next image is to be grabbed
+        number = re.fullmatch(r"/dev/video([0-9]{1,3})", _device(name))
+        camera = cv2.VideoCapture(int(number[1])) if number else None
+        if not (camera and camera.isOpened()):
+            raise _refuse(f"{name}: no camera that OpenCV can open: is it there, free, and may you read it? `ls -l /dev/video* /dev/v4l/by-id` tells")
+        self._camera = camera
+
+    def grab(self) -> None:
+        self._is_there = self._camera.grab()
+        self._time_s = time.monotonic()
+
+    def __iter__(self) -> Iterator[Tuple[Any, Optional[float]]]:
+        try:
+            while True:
+                if self._is_there is None:
+                    self.grab()
+                is_there, image = self._camera.retrieve() if self._is_there else (False, None)
+                if not is_there:
+                    break
+                self._is_there, self._begin_s = None, self._time_s if self._begin_s is None else self._begin_s
+                yield image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2RGB), self._time_s - self._begin_s
+            self.note = f"{self._name} gives no more images: was it unplugged?"
+        finally:
+            self._camera.release()
+
+
+def _open(source: str) -> _Source:
+    return (_Camera if is_camera(source) else _Files if _names_files(source) else _Video)(source)
 
 
 def _same_size(pair: RawPair, what: str) -> RawPair:
@@ -145,8 +192,8 @@ class RawPairs:
 
 class _TwoSources(RawPairs):
     def __init__(self, left: str, right: str) -> None:
-        if os.path.exists(left) and os.path.exists(right) and os.path.samefile(left, right):
-            raise _refuse(f"--left {left} --right {right}: are one file: give one of each camera, or --side-by-side or --top-bottom where it holds both views")
+        if _device(left) == _device(right) or (os.path.exists(left) and os.path.exists(right) and os.path.samefile(left, right)):
+            raise _refuse(f"--left {left} --right {right}: are one {'camera' if is_camera(left) else 'file'}: give one of each camera, or --side-by-side or --top-bottom where it holds both views")
         self._names = f"--left {left}", f"--right {right}"
         self._sources = _open(left), _open(right)
         counts = [source.count for source in self._sources]
@@ -155,9 +202,11 @@ class _TwoSources(RawPairs):
         self.count = counts[0]
 
     def __iter__(self) -> Iterator[RawPair]:
-        sources, pairs = [iter(source) for source in self._sources], 0
+        images_of, pairs = [iter(source) for source in self._sources], 0
         while True:
-            left, right = (next(source, None) for source in sources)
+            for source in self._sources:
+                source.grab()
+            left, right = (next(images, None) for images in images_of)
             if left is None or right is None:
                 break
             yield _same_size(RawPair(left[0], right[0], left[1]), self._names[0][7:])

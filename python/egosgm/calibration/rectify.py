@@ -21,7 +21,7 @@ import cv2
 _UNITS = {None: None, "m": 1.0, "cm": 0.01, "mm": 0.001}
 
 
-def _unit_m(unit: Optional[str]) -> Optional[float]:
+def unit_m(unit: Optional[str]) -> Optional[float]:
     if unit in _UNITS:
         return _UNITS[unit]
     try:
@@ -31,6 +31,14 @@ def _unit_m(unit: Optional[str]) -> Optional[float]:
     if not metres > 0:
         raise _egosgm.InvalidArgument(f"--unit {unit}: choose m, cm or mm, or give the metres of one unit, above 0")
     return metres
+
+
+def add_calibration(parser: Parser) -> None:
+    parser.add_argument("--calib", metavar="FILE", nargs="+", help="the calibration of the raw cameras, as egosgm.read_calibration reads it: OpenCV's (M1, D1, M2, D2, R, T; "
+        "YAML, XML or JSON), a folder with intrinsics.yml and extrinsics.yml, ROS's, Kalibr's; the left and the right camera's file, where each has one; or, for "
+        "images that are rectified already, what `run --calib` reads")
+    parser.add_argument("--fisheye", action="store_true", help="OpenCV's calibration is one of cv::fisheye: D1 and D2 hold four coefficients of the angle")
+    parser.add_argument("--unit", metavar="m|cm|mm|METRES", help="unit of T in OpenCV's calibration; where it counts a board's squares, the side of a square [m]; without: m")
 
 
 def _parser() -> Parser:
@@ -45,18 +53,14 @@ def _parser() -> Parser:
     add("--list", metavar="FILE", help="a text file with rows LEFT RIGHT or LEFT RIGHT SECONDS")
     add("--euroc", metavar="DIR", help="an EuRoC sequence (mav0 or its parent), with its own calibration")
     add = parser.add_argument
-    add("--calib", metavar="FILE", nargs="+", help="the calibration of the raw cameras, as egosgm.read_calibration reads it: OpenCV's (M1, D1, M2, D2, R, T; "
-        "YAML, XML or JSON), a folder with intrinsics.yml and extrinsics.yml, ROS's, Kalibr's; the left and the right camera's file, where each has one; or, for "
-        "images that are rectified already, what `run --calib` reads")
-    add("--fisheye", action="store_true", help="OpenCV's calibration is one of cv::fisheye: D1 and D2 hold four coefficients of the angle")
-    add("--unit", metavar="m|cm|mm|METRES", help="unit of T in OpenCV's calibration; where it counts a board's squares, the side of a square [m]; without: m")
+    add_calibration(parser)
     add("--alpha", type=decimal, default=0.0, metavar="A", help="0: only pixels that the raw images have; 1: all of theirs, with black borders; without: 0")
     add("--out", required=True, metavar="DIR", help="new folder: image_0 and image_1 (colour: image_2, image_3), calib.txt, times.txt, valid.png")
     add("--quiet", action="store_true", help="no progress, only errors")
     return parser
 
 
-class _Rectifier:
+class Rectifier:
     """What a pair goes through: rectification, or nothing where the images are rectified already."""
 
     def __init__(self, given: argparse.Namespace, size: Optional[Tuple[int, int]]) -> None:
@@ -88,7 +92,7 @@ class _Rectifier:
         pair.left, pair.right = self.rectification.rectify(pair.left, pair.right)
 
 
-class _SequenceFolder:
+class SequenceFolder:
     """KITTI odometry's layout, in a new or empty folder; colour goes to image_2 and image_3."""
 
     def __init__(self, folder: pathlib.Path) -> None:
@@ -110,7 +114,7 @@ class _SequenceFolder:
         self._times.append(pair.time_s)
         self.frames += 1
 
-    def finish(self, rectifier: _Rectifier) -> None:
+    def finish(self, rectifier: Rectifier) -> None:
         if self.frames == 0:
             raise _egosgm.InvalidArgument("the input has no pair: is it empty?")
         _egosgm._write_new_calibration(self._folder / "calib.txt", rectifier.calibration)
@@ -156,15 +160,15 @@ def main(arguments: Sequence[str]) -> int:
         raise _egosgm.InvalidArgument(f"--alpha {given.alpha:g}: choose from 0 to 1")
     if given.pair_by not in ("name", "order"):
         raise _egosgm.InvalidArgument(f"--pair-by {given.pair_by}: choose name or order")
-    given.unit = _unit_m(given.unit)
+    given.unit = unit_m(given.unit)
     if given.euroc and os.path.isdir(os.path.join(given.euroc, "mav0")):
         given.euroc = os.path.join(given.euroc, "mav0")
     pairs = open_pairs(given.left, given.right, given.side_by_side, given.top_bottom, given.list, given.euroc, given.pair_by == "order")
     stream = iter(pairs)
     first = next(stream, None)
-    rectifier = _Rectifier(given, first.left.shape[1::-1] if first else None)
+    rectifier = Rectifier(given, first.left.shape[1::-1] if first else None)
     expect_new_folder("--out", pathlib.Path(given.out))
-    folder = _SequenceFolder(pathlib.Path(given.out))
+    folder = SequenceFolder(pathlib.Path(given.out))
     stops: List[int] = []
     if threading.current_thread() is threading.main_thread():
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
