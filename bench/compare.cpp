@@ -15,6 +15,7 @@
 #include "egosgm/named_options.h"
 #include "egosgm/odometry.h"
 #include "egosgm/pipeline.h"
+#include "egosgm/vision/moving_objects.h"
 #include "egosgm/vision/opencv.h"
 #include "host/ocl/device_handle.h"
 #include "host/stages/matcher.h"
@@ -37,8 +38,8 @@ constexpr const char* kHelp =
     "egosgm_full_both: both views on the full range by the default options, checked, upload to download.\n"
     "egosgm_banded_frame: a steady frame of the method by the default options, upload to download, motion given.\n"
     "egosgm_banded_left: the same with the left view tracked alone. egosgm_video_frame: a steady frame as a stream,\n"
-    "with odometry. The last three play KITTI 2012 000151, frames 07..11, from the start in each turn and give the\n"
-    "mean of the last two frames.\n"
+    "with odometry. egosgm_video_objects: the same with objects that move by themselves and scene flow. The last four\n"
+    "play KITTI 2012 000151, frames 07..11, from the start in each turn and give the mean of the last two frames.\n"
     "threads: how many a row may have. cpus: processor time of all threads by wall time, how many threads were at work "
     "in the mean; on a CPU only.\n";
 
@@ -101,19 +102,25 @@ class Matcher {
   Matcher(const Clip& clip, const MethodOptions& options, const Device& device)
       : pipeline_(clip.calibration, clip.frames.front().left.cols, clip.frames.front().left.rows, options, device),
         disparity_(clip.frames.front().left.size(), vision::kF32),
-        variance_(disparity_.size(), vision::kF32) {}
+        variance_(disparity_.size(), vision::kF32),
+        dynamic_(disparity_.size(), vision::kU8) {}
 
   FrameReport operator()(const ClipFrame& frame, const std::optional<Motion>& motion) {
     submit(frame, motion);
     return collect();
   }
-  void submit(const ClipFrame& frame, const std::optional<Motion>& motion) {
+  void submit(const ClipFrame& frame, const std::optional<Motion>& motion, bool wants_dynamic = false) {
     FrameOutputs outputs;
     outputs.disparity = vision::map_view(disparity_);
     outputs.variance = vision::map_view(variance_);
+    if (wants_dynamic) outputs.debug.dynamic = {dynamic_.row(0), dynamic_.cols, dynamic_.rows, dynamic_.cols};
     pipeline_.submit(vision::image_view(frame.left), vision::image_view(frame.right), motion, outputs);
   }
   FrameReport collect() { return pipeline_.collect(); }
+
+  /// Of the frame collected last.
+  const vision::Image& disparity() const { return disparity_; }
+  const vision::Image& dynamic() const { return dynamic_; }
 
   void reset() { pipeline_.reset(); }
 
@@ -130,7 +137,7 @@ class Matcher {
 
  private:
   Pipeline pipeline_;
-  vision::Image disparity_, variance_;
+  vision::Image disparity_, variance_, dynamic_;
 };
 
 TurnFunction opencv(const OpencvMode& mode, const Clip& clip, int disparities, int threads) {
@@ -169,25 +176,34 @@ TurnFunction banded_frame(const Clip& clip, const MethodOptions& options, const 
   };
 }
 
-/// As `egosgm run` does it: a frame's odometry while the device is at work on the one before.
+/// As `egosgm run` does it: on the host, a frame's odometry, and the objects and scene flow of the one collected last,
+/// while the device is at work.
 class Stream {
  public:
-  Stream(const Clip& clip, const MethodOptions& options, const Device& device)
-      : clip_(clip), matcher_(clip, options, device), odometry_(clip.calibration) {}
+  Stream(const Clip& clip, const MethodOptions& options, const Device& device, bool finds_objects)
+      : clip_(clip),
+        finds_objects_(finds_objects),
+        matcher_(clip, options, device),
+        odometry_(clip.calibration),
+        tracker_(clip.calibration) {}
 
   Turn operator()() {
     matcher_.reset();
     odometry_.reset();
+    tracker_ = vision::ObjectTracker(clip_.calibration);
+    std::vector<std::optional<Motion>> motions;
     Stopwatch steady;
     for (std::size_t i = 0; i < clip_.frames.size(); ++i) {
-      const std::optional<Motion> motion = estimate(clip_.frames[i]);
-      matcher_.submit(clip_.frames[i], motion);
+      motions.push_back(estimate(clip_.frames[i]));
+      matcher_.submit(clip_.frames[i], motions[i], finds_objects_);
       if (i == 0) continue;
       matcher_.collect();
-      if (i == Clip::kSteadyFrom) steady = Stopwatch();  // after the odometry of the first one measured,
+      follow(clip_.frames[i - 1], motions[i - 1]);
+      if (i == Clip::kSteadyFrom) steady = Stopwatch();  // after the host's work for the first one measured,
     }
     estimate(clip_.frames[Clip::kSteadyFrom]);  // and therefore with that of the one after the last
     const FrameReport last = matcher_.collect();
+    follow(clip_.frames.back(), motions.back());
     return matcher_.turn(steady, last, clip_.frames.size() - Clip::kSteadyFrom);
   }
 
@@ -195,14 +211,22 @@ class Stream {
   std::optional<Motion> estimate(const ClipFrame& frame) {
     return odometry_.process(vision::image_view(frame.left), vision::image_view(frame.right)).motion;
   }
+  void follow(const ClipFrame& frame, const std::optional<Motion>& motion) {
+    if (!finds_objects_) return;
+    tracker_.process(frame.left, matcher_.disparity(), matcher_.dynamic(), motion);
+    tracker_.scene_flow();
+  }
 
   const Clip& clip_;
+  const bool finds_objects_;
   Matcher matcher_;
   StereoOdometry odometry_;
+  vision::ObjectTracker tracker_;
 };
 
+template <bool finds_objects>
 TurnFunction video_frame(const Clip& clip, const MethodOptions& options, const Device& device) {
-  const auto stream = std::make_shared<Stream>(clip, options, device);
+  const auto stream = std::make_shared<Stream>(clip, options, device, finds_objects);
   return [stream] { return (*stream)(); };
 }
 
@@ -294,7 +318,8 @@ std::vector<Contender> contenders(const Clip& clip, int disparities, const std::
   for (const std::string& setting : settings) {
     add_ours("egosgm_banded_frame " + setting, with(options, setting), banded_frame);
   }
-  add_ours("egosgm_video_frame", options, video_frame);
+  add_ours("egosgm_video_frame", options, video_frame<false>);
+  add_ours("egosgm_video_objects", options, video_frame<true>);
   return list;
 }
 

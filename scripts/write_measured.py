@@ -29,6 +29,7 @@ CONTENDERS = {
     "egosgm_banded_frame": "EgoSGM, steady frame, both views, motion given",
     "egosgm_banded_left": "EgoSGM, the same with the left view tracked alone",
     "egosgm_video_frame": "EgoSGM, steady frame with odometry",
+    "egosgm_video_objects": "EgoSGM, steady frame with odometry, objects and scene flow",
 }
 # Rows of the README's table: the name there, and the input and figure of a row of bench/accuracy.
 RESULTS = [

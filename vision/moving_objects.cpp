@@ -11,6 +11,7 @@
 #include "vision/pixel_group.h"
 #include "vision/pixel_motion.h"
 #include "vision/rigid_alignment.h"
+#include "vision/window_sums.h"
 
 namespace egosgm::vision {
 namespace {
@@ -34,9 +35,8 @@ constexpr double kSameFlow_px = 1.5;                    // two that differ by le
 constexpr double kSharedErrors = 16;                    // points whose disparities have an error in common count as one
 
 // What a motion costs at a pixel, in units of noise.
-constexpr double kMaxGreyCost = 10, kMaxDisparityCost = 3, kUnknownCost = 1, kHiddenCost = 1.3;
-constexpr double kMinGain = 0.33;  // of a labelled pixel, against the camera's motion
-constexpr int kWindow_px = 4;      // to all sides, in steps of two pixels: pixels that decide with it
+constexpr float kMaxGreyCost = 10, kMaxDisparityCost = 3, kUnknownCost = 1, kHiddenCost = 1.3f;
+constexpr float kMinGain = 0.33f;  // of a labelled pixel and those around, against the camera's motion
 
 // A median over a few of a group's pixels: `value` gives none where a pixel says nothing.
 template <typename Value>
@@ -67,6 +67,7 @@ struct Track {
   Eigen::Vector3d velocity_m{0, 0, 0};
   Eigen::Isometry3d own =
       Eigen::Isometry3d::Identity();  // its motion without the camera's, in the newest camera's frame
+  Box box{};                          // of its label
 };
 
 /// A group on its way to an object.
@@ -75,8 +76,8 @@ struct Candidate {
   Group group;
   Eigen::Isometry3d back;  // its motion from the newest frame to the last one
   RigidFit fit{};
-  Box box{};                   // where its label may reach
-  std::vector<float> gains{};  // of the pixels of `box`; 0: not its label's
+  Box box{};          // where its label may reach
+  BoxValues gains{};  // 0: not its label's
   Group label{};
 
   bool is_new() const { return track.id == 0; }
@@ -113,7 +114,8 @@ struct ObjectTracker::State {
   Group moved_on(const Track& track) const;
   std::vector<Group> new_groups(const Image& dynamic, const std::vector<Candidate>& known) const;
   std::vector<SurfacePoint> points_of(const Group& group) const;
-  double cost(const Pixel& p, const PixelMotion& back) const;
+  float cost_of(const Pixel& p, float u_seen, float v_seen, float d_seen) const;
+  BoxValues costs(const Box& box, const BoxValues& disparities, const PixelMotion& back) const;
   bool label(Candidate& candidate) const;
   double flow_apart(const Group& group, const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) const;
   double contradiction(const Group& group, const Eigen::Isometry3d& back) const;
@@ -157,8 +159,9 @@ double ObjectTracker::State::grey_noise(const Image& dynamic) const {
 Group ObjectTracker::State::moved_on(const Track& track) const {
   const PixelMotion ahead = in_pixels(motion->current_from_previous * track.own);
   Image there(size, kU8, 0);
-  for (int y = 0; y < size.height; ++y) {
-    for (int x = 0; x < size.width; ++x) {
+  Group seen_at;
+  for (int y = track.box.top; y < track.box.bottom; ++y) {
+    for (int x = track.box.left; x < track.box.right; ++x) {
       if (last_labels.at<std::uint8_t>(y, x) != track.id) continue;
       const auto seen = ahead(x, y, last.filled.at<float>(y, x));
       if (!seen) continue;
@@ -166,12 +169,13 @@ Group ObjectTracker::State::moved_on(const Track& track) const {
       for (const Pixel& p : {Pixel{u, v}, {u + 1, v}, {u, v + 1}, {u + 1, v + 1}}) {
         if (!is_inside(p.x, p.y) || std::abs(disparity(p) - seen->z()) >= 2 * alike_px(seen->z())) continue;
         there.at<std::uint8_t>(p.y, p.x) = 1;
+        seen_at.add(p.x, p.y);
       }
     }
   }
   Group group;
-  for (int y = 0; y < size.height; ++y) {
-    for (int x = 0; x < size.width; ++x) {
+  for (int y = seen_at.box.top; y < seen_at.box.bottom; ++y) {
+    for (int x = seen_at.box.left; x < seen_at.box.right; ++x) {
       if (there.at<std::uint8_t>(y, x)) group.add(x, y);
     }
   }
@@ -241,23 +245,37 @@ std::vector<SurfacePoint> ObjectTracker::State::points_of(const Group& group) co
   return points;
 }
 
-/// By how much the last frame contradicts that the surface at a pixel came from where `back` leads. NaN: it says
-/// nothing.
-double ObjectTracker::State::cost(const Pixel& p, const PixelMotion& back) const {
-  const auto seen = moved(back, p);
-  if (!seen) return NAN;
-  const double u0 = std::floor(seen->x()), v0 = std::floor(seen->y());
-  if (!(u0 >= 0 && v0 >= 0 && u0 + 1 < size.width && v0 + 1 < size.height)) return NAN;
+/// By how much the last frame contradicts that the surface at a pixel came from `seen`. NaN: it says nothing.
+float ObjectTracker::State::cost_of(const Pixel& p, float u_seen, float v_seen, float d_seen) const {
+  const float u0 = std::floor(u_seen), v0 = std::floor(v_seen);
+  if (!(u0 >= 0 && v0 >= 0 && u0 + 1 < static_cast<float>(size.width) && v0 + 1 < static_cast<float>(size.height))) {
+    return NAN;
+  }
   const int u = static_cast<int>(u0), v = static_cast<int>(v0);
-  const double s = seen->x() - u0, t = seen->y() - v0;
-  const float d = last.disparity.at<float>(v + (t >= 0.5), u + (s >= 0.5));
-  if (d > seen->z() + 0.5 + alike_px(seen->z())) return kHiddenCost;  // by something nearer
+  const float s = u_seen - u0, t = v_seen - v0;
+  const float d = last.disparity.at<float>(v + (t >= 0.5f), u + (s >= 0.5f));
+  if (d > d_seen + 0.5f + static_cast<float>(alike_px(d_seen))) return kHiddenCost;  // by something nearer
   const float *upper = last.greys[0].row<float>(v) + u, *lower = last.greys[0].row<float>(v + 1) + u;
-  const double grey = (1 - t) * ((1 - s) * upper[0] + s * upper[1]) + t * ((1 - s) * lower[0] + s * lower[1]);
-  const double of_grey = std::abs(grey - now.greys[0].at<float>(p.y, p.x)) / noise.grey;
+  const float grey = (1 - t) * ((1 - s) * upper[0] + s * upper[1]) + t * ((1 - s) * lower[0] + s * lower[1]);
+  const float of_grey = std::abs(grey - now.greys[0].at<float>(p.y, p.x)) / static_cast<float>(noise.grey);
   const bool is_known = d > kInvalidDisparity;
   return std::min(of_grey, kMaxGreyCost) +
-         (is_known ? std::min(std::abs(d - seen->z()), kMaxDisparityCost) : kUnknownCost);
+         (is_known ? std::min(std::abs(d - d_seen), kMaxDisparityCost) : kUnknownCost);
+}
+
+/// That of the pixels of a box that have a disparity, if they came from where `back` leads.
+BoxValues ObjectTracker::State::costs(const Box& box, const BoxValues& disparities, const PixelMotion& back) const {
+  BoxValues of_pixels(box.area(), NAN);
+  MovedRow seen;
+  for (int y = box.top; y < box.bottom; ++y) {
+    const auto row = disparities.begin() + static_cast<std::ptrdiff_t>(box.index(box.left, y));
+    back.of_row(box.left, y, {row, row + box.width()}, seen);
+    for (int x = box.left; x < box.right; ++x) {
+      const auto i = static_cast<std::size_t>(x - box.left);
+      of_pixels[box.index(x, y)] = cost_of({x, y}, seen.u[i], seen.v[i], seen.d[i]);
+    }
+  }
+  return of_pixels;
 }
 
 /// Decides by the images which pixels near a candidate move with it. False: too few do.
@@ -272,33 +290,20 @@ bool ObjectTracker::State::label(Candidate& candidate) const {
   const double low = quantile(0.06), high = quantile(0.94);
   const double least = low - 0.5 * alike_px(low), most = high + 0.5 * alike_px(high);
   const Box box = candidate.group.box.padded(candidate.is_new() ? kNewPad_px : kKnownPad_px, size);
-  const auto visit = [&](const auto& act) {
-    for (int y = box.top; y < box.bottom; ++y) {
-      for (int x = box.left; x < box.right; ++x) {
-        const double d = disparity({x, y});
-        if (d > least && d < most) act(x, y, d);
-      }
+  BoxValues near(box.area(), NAN);  // disparities as those of the group
+  for (int y = box.top; y < box.bottom; ++y) {
+    for (int x = box.left; x < box.right; ++x) {
+      const double d = disparity({x, y});
+      if (d > least && d < most) near[box.index(x, y)] = static_cast<float>(d);
     }
-  };
+  }
 
-  const PixelMotion by_camera = in_pixels(camera_back), by_own = in_pixels(candidate.back);
-  std::vector<double> of_pixels(box.area(), NAN);
-  visit([&](int x, int y, double) { of_pixels[box.index(x, y)] = cost({x, y}, by_camera) - cost({x, y}, by_own); });
+  BoxValues gains = costs(box, near, in_pixels(camera_back));
+  const BoxValues by_own = costs(box, near, in_pixels(candidate.back));
+  for (std::size_t i = 0; i < gains.size(); ++i) gains[i] -= by_own[i];
   candidate.box = box;
-  candidate.gains.assign(box.area(), 0);
-  visit([&](int x, int y, double d) {
-    double sum = 0;
-    int count = 0;
-    for (int v = y - kWindow_px; v <= y + kWindow_px; v += 2) {
-      for (int u = x - kWindow_px; u <= x + kWindow_px; u += 2) {
-        if (!box.contains(u, v) || std::isnan(of_pixels[box.index(u, v)])) continue;
-        if (std::abs(disparity({u, v}) - d) > alike_px(d)) continue;
-        sum += of_pixels[box.index(u, v)];
-        ++count;
-      }
-    }
-    if (count > 2 && sum > kMinGain * count) candidate.gains[box.index(x, y)] = static_cast<float>(sum / count);
-  });
+  candidate.gains = means_of_alike(box, near, gains);
+  for (float& gain : candidate.gains) gain = gain > kMinGain ? gain : 0;
 
   std::vector<char> is_in_group(box.area(), 0);
   for (const Pixel& p : candidate.group.pixels) is_in_group[box.index(p.x, p.y)] = 1;
@@ -389,7 +394,10 @@ bool ObjectTracker::State::absorb(const Group& group, std::vector<Candidate>& fo
     if (!group.box.padded(kBlock_px, size).touches(object.label.box)) continue;
     const PixelMotion by_object = in_pixels(object.back);
     const double hidden = share_of(group, [&](const Pixel& p) {
-      const double there = cost(p, by_object);
+      const auto seen = moved(by_object, p);
+      const float there =
+          seen ? cost_of(p, static_cast<float>(seen->x()), static_cast<float>(seen->y()), static_cast<float>(seen->z()))
+               : NAN;
       return std::isnan(there) || there == kHiddenCost;
     });
     if (hidden < 0.5) continue;
@@ -474,7 +482,7 @@ void ObjectTracker::State::find_objects(const Image& dynamic) {
     describe(object, group, now.filled);
     object.velocity_m = object.centre_m - motion->current_from_previous * (each.back * object.centre_m);
     object.velocity_covariance_m2 = kSharedErrors * each.fit.covariance.topLeftCorner<3, 3>();
-    tracks.push_back({object.id, object.age, object.velocity_m, object.current_from_previous * camera_back});
+    tracks.push_back({object.id, object.age, object.velocity_m, object.current_from_previous * camera_back, group.box});
     moving.push_back(std::move(object));
   }
 }
@@ -528,23 +536,37 @@ SceneFlow ObjectTracker::State::scene_flow() const {
     movers.push_back({&object, in_pixels(object.current_from_previous), before.box.padded(kPad_px, size), {}});
   }
   const PixelMotion by_camera = in_pixels(motion->current_from_previous);
+  const auto write = [&](int x, int y, float u, float v, float d) {
+    float* flow = result.flow.row<float>(y) + 2 * x;
+    flow[0] = u - static_cast<float>(x);
+    flow[1] = v - static_cast<float>(y);
+    result.next_disparity.at<float>(y, x) = std::isnan(d) ? kInvalidDisparity : d;
+  };
+  MovedRow there;
   for (int y = 0; y < size.height; ++y) {
+    const float* row = last.filled.row<float>(y);
+    by_camera.of_row(0, y, {row, row + size.width}, there);
     for (int x = 0; x < size.width; ++x) {
-      const double d = last.filled.at<float>(y, x);
-      std::optional<Eigen::Vector3d> there = by_camera(x, y, d);
-      for (Mover& each : movers) {
-        if (!each.box.contains(x, y)) continue;
-        const auto seen = each.ahead(x, y, d);
+      const auto i = static_cast<std::size_t>(x);
+      write(x, y, there.u[i], there.v[i], there.d[i]);
+    }
+  }
+  for (std::size_t i = movers.size(); i-- > 0;) {  // the first one has the last word
+    Mover& each = movers[i];
+    for (int y = each.box.top; y < each.box.bottom; ++y) {
+      for (int x = each.box.left; x < each.box.right; ++x) {
+        const auto seen = each.ahead(x, y, last.filled.at<float>(y, x));
         if (!seen || !has_label(each.object->id, {x, y}, *seen)) continue;
-        each.label.add(x, y);
         result.labels.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(each.object->id);
-        there = seen;
-        break;
+        write(x, y, static_cast<float>(seen->x()), static_cast<float>(seen->y()), static_cast<float>(seen->z()));
       }
-      float* flow = result.flow.row<float>(y) + 2 * x;
-      flow[0] = there ? static_cast<float>(there->x() - x) : NAN;
-      flow[1] = there ? static_cast<float>(there->y() - y) : NAN;
-      result.next_disparity.at<float>(y, x) = there ? static_cast<float>(there->z()) : kInvalidDisparity;
+    }
+  }
+  for (Mover& each : movers) {
+    for (int y = each.box.top; y < each.box.bottom; ++y) {
+      for (int x = each.box.left; x < each.box.right; ++x) {
+        if (result.labels.at<std::uint8_t>(y, x) == each.object->id) each.label.add(x, y);
+      }
     }
   }
   const Eigen::Isometry3d camera = motion->current_from_previous;

@@ -3,10 +3,18 @@
 
 #include <Eigen/Geometry>
 #include <optional>
+#include <vector>
 
 #include "egosgm/calibration.h"
 
 namespace egosgm::vision {
+
+constexpr double kMinDepthRatio = 1e-3;  // of the depths after and before a motion
+
+/// Where pixels of a row go.
+struct MovedRow {
+  std::vector<float> u, v, d;
+};
 
 /// A rigid motion of points as a projective map of (u, v, disparity).
 class PixelMotion {
@@ -31,9 +39,10 @@ class PixelMotion {
     return there.head<3>() / there.w();
   }
 
- private:
-  static constexpr double kMinDepthRatio = 1e-3;  // of the depths after and before
+  /// The same of pixels x, x + 1, ... of row v, whose disparities are `d`, in floats. NaN: none.
+  void of_row(int x, int v, const std::vector<float>& d, MovedRow& there) const;
 
+ private:
   Eigen::Matrix4d matrix_;
 };
 

@@ -3,9 +3,11 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "egosgm/vision/evaluation.h"
+#include "host/cpu_clones.h"
 #include "host/odometry/geometry.h"
 #include "vision/image_values.h"
 
@@ -77,7 +79,7 @@ struct Sample {
 };
 
 /// Bilinear, with its derivative; none outside.
-std::optional<Sample> sample(const Image& image, double u, double v) {
+inline std::optional<Sample> sample(const Image& image, double u, double v) {
   const double x0 = std::floor(u), y0 = std::floor(v);
   if (!(x0 >= 0 && y0 >= 0 && x0 + 1 < image.cols && y0 + 1 < image.rows)) return std::nullopt;
   const int x = static_cast<int>(x0), y = static_cast<int>(y0);
@@ -106,6 +108,22 @@ std::optional<Sample> sample_disparity(const Image& disparity, double u, double 
   return Sample{nearest, 0, 0};
 }
 
+/// Two rows of pixels, and where between four of them.
+struct RowPair {
+  const float *upper, *lower;
+  float s, t;
+};
+
+EGOSGM_CPU_CLONES
+void add_differences(const RowPair rows, float grey, float most, int count, float* __restrict sums) {
+  for (int x = 0; x < count; ++x) {
+    const float top = rows.upper[x] + rows.s * (rows.upper[x + 1] - rows.upper[x]);
+    const float bottom = rows.lower[x] + rows.s * (rows.lower[x + 1] - rows.lower[x]);
+    const float apart = std::abs(top + rows.t * (bottom - top) - grey);
+    sums[x] += apart < most ? apart : most;
+  }
+}
+
 /// A small translation and rotation `step` about `centre`, after `motion`.
 Eigen::Isometry3d turned_about(const Eigen::Vector3d& centre, const Vector6& step, const Eigen::Isometry3d& motion) {
   const Eigen::Vector3d turn = step.tail<3>();
@@ -124,7 +142,7 @@ struct Equations {
   void add(const Vector6& by_twist, double residual, double sigma) {
     const double scaled = residual / sigma;
     const double weight = odometry::cauchy_weight(scaled * scaled, kCauchyScale2) / (sigma * sigma);
-    information.selfadjointView<Eigen::Lower>().rankUpdate(by_twist, weight);
+    information.noalias() += (weight * by_twist) * by_twist.transpose();
     gradient.noalias() += weight * residual * by_twist;
   }
 };
@@ -171,8 +189,12 @@ std::optional<RigidFit> align_rigidly(const Calibration& calibration, const Alig
         const Eigen::Vector3d moved = fit.motion * points[i].point_m;
         if (!(moved.z() > odometry::kMinDepth_m) || std::isnan(greys[i])) continue;
         const Eigen::Vector3d seen = odometry::project(calibration, moved);
-        const odometry::MotionJacobian by_motion =
-            odometry::motion_jacobian(odometry::projection_jacobian(calibration, moved), moved - fit.centre_m);
+        const Eigen::Matrix3d by_point = odometry::projection_jacobian(calibration, moved);
+        const Eigen::Vector3d arm = moved - fit.centre_m;
+        const auto by_twist = [&](const Eigen::Vector3d& of_pixel) {
+          const Eigen::Vector3d of_point = by_point.transpose() * of_pixel;
+          return (Vector6() << of_point, arm.cross(of_point)).finished();
+        };
         const auto grey = sample(to.greys[level], at_level(seen.x(), level), at_level(seen.y(), level));
         if (!grey) continue;
         const auto disparity = sample_disparity(to.disparity, seen.x(), seen.y());
@@ -180,13 +202,10 @@ std::optional<RigidFit> align_rigidly(const Calibration& calibration, const Alig
         if (apart > kFarDisparity_px + 0.05 * seen.z()) continue;  // something nearer hides it
         ++asked;
         const double different = grey->value - greys[i];
-        equations.add(scale * (grey->by_u * by_motion.row(0) + grey->by_v * by_motion.row(1)).transpose(), -different,
-                      noise.grey);
+        equations.add(by_twist({scale * grey->by_u, scale * grey->by_v, 0}), -different, noise.grey);
         bool agrees = std::abs(different) < 3 * noise.grey;
         if (disparity && std::abs(apart) < kFarDisparity_px) {
-          const Vector6 by_twist =
-              (by_motion.row(2) - disparity->by_u * by_motion.row(0) - disparity->by_v * by_motion.row(1)).transpose();
-          equations.add(by_twist, apart, noise.disparity_px);
+          equations.add(by_twist({-disparity->by_u, -disparity->by_v, 1}), apart, noise.disparity_px);
         }
         if (disparity) agrees = agrees && std::abs(apart) < 3 * noise.disparity_px;
         agree += agrees;
@@ -229,18 +248,34 @@ Eigen::Isometry3d best_shift(const Calibration& calibration, const AlignedView& 
       places.push_back({static_cast<float>(at_level(seen.x(), kLevel)), static_cast<float>(at_level(seen.y(), kLevel)),
                         static_cast<float>(grey->value)});
   }
-  const double most = 6 * noise.grey;
-  double best = INFINITY;
+  const auto most = static_cast<float>(6 * noise.grey);
+  constexpr int kWidth = 2 * kRadiusX + 1, kHeight = 2 * kRadiusY + 1;
+  std::array<std::array<float, kWidth>, kHeight> sums{};
+  for (const Place& place : places) {
+    const int left = static_cast<int>(std::floor(place.u)) - kRadiusX;
+    const int top = static_cast<int>(std::floor(place.v)) - kRadiusY;
+    const float s = place.u - std::floor(place.u), t = place.v - std::floor(place.v);
+    // Columns whose four pixels lie in the image; all others count as most.
+    const int first = std::clamp(-left, 0, kWidth), end = std::clamp(other.cols - 1 - left, first, kWidth);
+    for (int y = 0; y < kHeight; ++y) {
+      float* row = sums[static_cast<std::size_t>(y)].data();
+      const bool is_inside = top + y >= 0 && top + y + 1 < other.rows;
+      const int begin = is_inside ? first : kWidth, stop = is_inside ? end : kWidth;
+      for (int x = 0; x < begin; ++x) row[x] += most;
+      for (int x = stop; x < kWidth; ++x) row[x] += most;
+      if (begin == stop) continue;
+      const int column = left + begin;
+      add_differences({other.row<float>(top + y) + column, other.row<float>(top + y + 1) + column, s, t}, place.grey,
+                      most, stop - begin, row + begin);
+    }
+  }
+  float best = INFINITY;
   int best_x = 0, best_y = 0;
   for (int y = -kRadiusY; y <= kRadiusY; ++y) {
     for (int x = -kRadiusX; x <= kRadiusX; ++x) {
-      const double of_distance = 1 + 0.002 * (x * x + y * y);  // near places first, where none is better
-      double sum = 0;
-      for (const Place& place : places) {
-        const auto grey = sample(other, place.u + x, place.v + y);
-        sum += of_distance * (grey ? std::min(most, std::abs(grey->value - place.grey)) : most);
-        if (sum >= best) break;
-      }
+      const float of_distance = 1 + 0.002f * static_cast<float>(x * x + y * y);  // near places, where none is better
+      const float sum =
+          of_distance * sums[static_cast<std::size_t>(y + kRadiusY)][static_cast<std::size_t>(x + kRadiusX)];
       if (sum >= best) continue;
       best = sum;
       best_x = x;

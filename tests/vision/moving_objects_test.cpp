@@ -6,9 +6,14 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <random>
+#include <vector>
 
 #include "egosgm/error.h"
 #include "egosgm/vision/synthetic.h"
+#include "vision/pixel_motion.h"
+#include "vision/window_sums.h"
 
 namespace egosgm::vision {
 namespace {
@@ -226,6 +231,58 @@ TEST(MovingObjects, RefusalsLeaveTheState) {
   none.current_from_previous.linear() *= 2;
   EXPECT_THROW(tracker.process(images.left, images.left_disparity, images.left_moving, none), InvalidArgument);
   EXPECT_TRUE(found_at(process(tracker, kFirst + 1), largest(kFirst + 1)));
+}
+
+TEST(MovingObjects, RowsOfPixelsMoveAsEachPixelDoes) {
+  const Eigen::Isometry3d motion(Eigen::Translation3d(0.3, -0.1, -4) *
+                                 Eigen::AngleAxisd(0.05, Eigen::Vector3d::UnitY()));
+  const PixelMotion move(street().calibration(), motion);
+  std::vector<float> disparities;
+  for (int i = 0; i < 37; ++i) disparities.push_back(3.0f + 2 * static_cast<float>(i));
+  disparities[5] = NAN;
+  MovedRow there;
+  move.of_row(11, 90, disparities, there);
+  int behind = 0;
+  for (int i = 0; i < 37; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const auto expected = i == 5 ? std::nullopt : move(11 + i, 90, disparities[k]);
+    ASSERT_EQ(std::isnan(there.u[k]), !expected) << i;
+    if (!expected) {
+      ++behind;
+      continue;
+    }
+    EXPECT_FLOAT_EQ(there.u[k], static_cast<float>(expected->x())) << i;
+    EXPECT_FLOAT_EQ(there.v[k], static_cast<float>(expected->y())) << i;
+    EXPECT_FLOAT_EQ(there.d[k], static_cast<float>(expected->z())) << i;
+  }
+  EXPECT_GT(behind, 1);  // near surfaces pass the camera
+}
+
+TEST(MovingObjects, MeansTakeWhatIsAlikeAround) {
+  const Box box{3, 2, 3 + 21, 2 + 13};
+  std::mt19937 random(7);
+  BoxValues disparities(box.area()), values(box.area());
+  for (std::size_t i = 0; i < box.area(); ++i) {
+    disparities[i] = random() % 9 == 0 ? NAN : static_cast<float>(random() % 6);
+    values[i] = std::isnan(disparities[i]) || random() % 4 == 0 ? NAN : static_cast<float>(random() % 100);
+  }
+  const BoxValues means = means_of_alike(box, disparities, values);
+  for (int y = box.top; y < box.bottom; ++y) {
+    for (int x = box.left; x < box.right; ++x) {
+      const float d = disparities[box.index(x, y)];
+      float sum = 0;
+      int count = 0;
+      for (int v = y - 4; v <= y + 4; v += 2) {
+        for (int u = x - 4; u <= x + 4; u += 2) {
+          if (!box.contains(u, v) || std::isnan(values[box.index(u, v)])) continue;
+          if (!(std::abs(disparities[box.index(u, v)] - d) <= alike_px(d))) continue;
+          sum += values[box.index(u, v)];
+          ++count;
+        }
+      }
+      EXPECT_EQ(means[box.index(x, y)], count > 2 ? sum / static_cast<float>(count) : 0) << x << " " << y;
+    }
+  }
 }
 
 }  // namespace
