@@ -149,9 +149,9 @@ int run(int argc, char** argv) {
   for (const shared::ImageSize size : arguments.size ? std::vector{*arguments.size} : all_sizes) {
     for (const int disparities : arguments.disparities ? std::vector{*arguments.disparities} : all_ranges) {
       if (!run_frames(device, size, disparities, arguments, machine.copy_gb_s, recorded, rows)) is_same = false;
+      if (!arguments.json.empty()) write_json(arguments.json, machine, rows);  // it may be stopped
     }
   }
-  if (!arguments.json.empty()) write_json(arguments.json, machine, rows);
   return rows.empty() || !is_same ? 1 : 0;
 }
 

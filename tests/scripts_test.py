@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every script explains itself by --help, and refuses what it does not know with one line, before it does anything."""
+import contextlib
+import importlib.util
+import io
+import json
 import os
 import pathlib
 import re
@@ -64,6 +68,17 @@ class Scripts(unittest.TestCase):
                               ({"disparity": ["a", "b", "c", "e"], "pfm": ["d"], "right": ["f"]}, ["default: disparity of frame 3", "default: right of frame 0"])):
             self.assertEqual(differences(before, {"images": before["images"], "runs": {"default": change, "new": {"pfm": ["g"]}}}), named)
 
+    def test_same_bits_begins_no_run_after_its_time(self):
+        with unittest.mock.patch.object(sys, "path", [str(SCRIPTS), *sys.path]):
+            same_bits = runpy.run_path(str(SCRIPTS / "same-bits"))
+        begun = []
+        record = same_bits["record"]
+        with unittest.mock.patch.dict(record.__globals__, render=lambda *_: None, checksums=lambda _: {}, call=lambda *words: begun.append(words)):
+            now, late = record("program", None, re.compile("^default"), seconds=-1)
+            self.assertEqual((now["runs"], late, begun), ({}, ["default", "default_paths", "default_16_bits"], []))
+            now, late = record("program", None, re.compile("^default"))
+        self.assertEqual((list(now["runs"]), late, len(begun)), (["default", "default_paths", "default_16_bits"], [], 3))
+
     def test_a_word_too_many_is_refused(self):
         for name, arguments in {"install-dependencies": ["--program", "again"], "format": ["--check", "all"], "measure": ["--build", "b", "c"],
                                 "build-site": ["now"], "try-arm": ["now"], "lanes": ["asan", "usan"], "build-wheel": ["python9.9"]}.items():
@@ -73,16 +88,21 @@ class Scripts(unittest.TestCase):
                 self.assertIn(f"{arguments[-1]}", done.stderr)
 
 
-    def test_figures_of_an_earlier_run_are_not_those_of_one_that_crashed(self):
-        """With tests that pass, and benchmarks that end by a signal before they write."""
+    def measured_by(self, programs):
+        """A checkout whose build makes these programs, by file: bench-device and what it calls, without CMake."""
         root = pathlib.Path(self.folder.name, "source")
-        for name, text in {"scripts/bench-device": (SCRIPTS / "bench-device").read_text(), "scripts/usage.sh": (SCRIPTS / "usage.sh").read_text(),
-                           "build-device/tests/egosgm_stage_test": "#!/bin/sh\n", "build-device/bench/egosgm_stages": "#!/bin/sh\nkill -SEGV $$\n",
-                           "build-device/stages.json": "{}", "mine.json": "{}"}.items():
+        copied = {name: (SCRIPTS.parent / name).read_text() for name in ("scripts/bench-device", "scripts/usage.sh", "bench/device.py")}
+        for name, text in {**copied, **programs}.items():
             (root / name).parent.mkdir(parents=True, exist_ok=True)
             (root / name).write_text(text)
             (root / name).chmod(0o755)
         pathlib.Path(self.folder.name, "cmake").write_text("#!/bin/sh\n")
+        return root
+
+    def test_figures_of_an_earlier_run_are_not_those_of_one_that_crashed(self):
+        """With tests that pass, and benchmarks that end by a signal before they write."""
+        root = self.measured_by({"build-device/tests/egosgm_stage_test": "#!/bin/sh\n", "build-device/bench/egosgm_stages": "#!/bin/sh\nkill -SEGV $$\n",
+                                 "build-device/stages.json": "{}", "mine.json": "{}"})
         for arguments in ([], ["--json", root / "mine.json"]):
             done = self.called(root / "scripts/bench-device", *arguments)
             self.assertEqual(done.returncode, 1, done.stderr)
@@ -90,6 +110,66 @@ class Scripts(unittest.TestCase):
             self.assertIn("ended without figures", done.stderr)
         self.assertFalse((root / "build-device/stages.json").exists())
         self.assertTrue((root / "mine.json").exists())
+
+    PARTS = ("stage tests", "stages", "same-bits", "kernels", "stream", "tuner")
+    # Each writes what follows --json or --file in its arguments.
+    WRITES = '#!/bin/sh\nuntil [ "$1" = --json ] || [ "$1" = --file ]; do shift; done\n'
+    HEAD = {"device": "a GPU", "driver": "1", "version": "OpenCL 3.0", "compute_units": 9, "threads": 2, "commit": "abc", "date": "today", "input": "a street"}
+    DEVICE = {
+        "build-device/tests/egosgm_stage_test": "#!/bin/sh\ncase $1 in --gtest_list_tests) echo A.; echo '  B'; echo '  C' ;; *) echo '[       OK ] A.B (3 ms)' ;; esac\n",
+        "build-device/bench/egosgm_stages": WRITES + f"echo '{json.dumps({**HEAD, 'copy_gb_s': 3, 'rows': [1]})}' >$2\n",
+        "build-device/bench/egosgm_kernels": "",
+        "build-device/bench/egosgm_offload": WRITES + f"echo '{json.dumps({**HEAD, 'rows': [2]})}' >$2\n",
+        "build-device/apps/egosgm": WRITES + "echo '  row_group 32   0.5 ms'; echo Kept for a GPU: $2; echo '{\"kept\": 5}' >$2\n",
+        "bench/kernels.py": f"import pathlib, sys\npathlib.Path(sys.argv[sys.argv.index('--json') + 1]).write_text('{json.dumps({**HEAD, 'kernels': [3]})}')\n",
+        "scripts/same-bits": "print('the same to the bit: 1 runs')\nprint('/home/somebody')\n",
+    }
+
+    def test_every_part_of_a_device_is_in_one_file(self):
+        root = self.measured_by(self.DEVICE)
+        done = self.called(root / "scripts/bench-device", "--all", "--size", "16x9")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        found = json.loads((root / "build-device/stages.json").read_text())
+        self.assertEqual({name: found[name] for name in ("device", "copy_gb_s", "rows", "stream", "same_bits")},
+                         {"device": "a GPU", "copy_gb_s": 3, "rows": [1], "stream": [2], "same_bits": ["the same to the bit: 1 runs"]})
+        self.assertEqual(found["kernels"]["kernels"], [3])
+        self.assertEqual(found["tuning"], {"tried": ["  row_group 32   0.5 ms"], "kept": {"kept": 5}})
+        self.assertEqual((found["tests"]["failed"], found["tests"]["of"]), (0, 2))
+        self.assertEqual({name: part["end"] for name, part in found["parts"].items()}, dict.fromkeys(self.PARTS, "passed"))
+        self.assertNotIn(str(root), json.dumps(found))
+
+    def test_a_part_that_fails_or_lacks_its_program_takes_no_other_with_it(self):
+        crashed = "#!/bin/sh\necho '[  FAILED  ] A.C (1 ms)'\nkill -SEGV $$\n"
+        left_out = "left out: the program's libraries are missing"
+        for broken, ends, code in (({"build-device/tests/egosgm_stage_test": crashed}, {"stage tests": "failed"}, 1),
+                                   ({"build-device/bench/egosgm_stages": "#!/bin/sh\nkill -SEGV $$\n"}, {"stages": "failed"}, 1),
+                                   ({"scripts/same-bits": "print('differs: default')\nraise SystemExit(1)\n"}, {"same-bits": "failed"}, 1),
+                                   ({"build-device/apps/egosgm": None}, {"same-bits": left_out, "tuner": left_out}, 0)):
+            with self.subTest(broken=list(broken)):
+                shutil.rmtree(pathlib.Path(self.folder.name, "source"), ignore_errors=True)
+                root = self.measured_by({name: text for name, text in {**self.DEVICE, **broken}.items() if text is not None})
+                done = self.called(root / "scripts/bench-device", "--all", "--seconds", "0")
+                self.assertEqual(done.returncode, code, done.stderr)
+                found = json.loads((root / "build-device/stages.json").read_text())
+                self.assertEqual({name: part["end"] for name, part in found["parts"].items()}, {**dict.fromkeys(self.PARTS, "passed"), **ends})
+                for name, end in ends.items():
+                    self.assertIn(f"{name}: {end}", done.stdout)
+                self.assertEqual((found["device"], found["stream"], found["rows"]), ("a GPU", [2], [] if "stages" in ends else [1]))
+
+    def test_a_part_that_is_late_is_stopped_with_what_it_started(self):
+        root = self.measured_by({**self.DEVICE, "build-device/bench/egosgm_stages": "#!/bin/sh\nsleep 3000 & wait\n"})
+        spec = importlib.util.spec_from_file_location("device", root / "bench/device.py")
+        device = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(device)
+        device.ALL.update({**dict.fromkeys(self.PARTS, 900), "stages": 0.1})
+        arguments = ["device.py", "--programs", str(root / "build-device"), "--out", str(root / "build-device"), "--json", str(root / "all.json"), "--all"]
+        said = io.StringIO()
+        with unittest.mock.patch.object(sys, "argv", arguments), unittest.mock.patch.dict(os.environ), contextlib.redirect_stdout(said):
+            self.assertEqual(device.main(), 0)
+        found = json.loads((root / "all.json").read_text())
+        self.assertEqual({name: part["end"] for name, part in found["parts"].items()}, {**dict.fromkeys(self.PARTS, "passed"), "stages": "stopped after 0.1 s"})
+        self.assertIn("stages: stopped after 0.1 s", said.getvalue())
+        self.assertEqual((found["device"], found["rows"], found["stream"]), ("a GPU", [], [2]))
 
     def test_a_path_with_a_blank_and_a_comma_is_one_path_or_refused(self):
         root = pathlib.Path(self.folder.name, "a b, c")
