@@ -468,16 +468,19 @@ void ObjectTracker::State::find_objects(const Image& dynamic) {
   }
   write_labels(found);
 
+  std::array<Group, 256> labelled;  // a pixel once, though two candidates may share it
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) {
+      if (const std::uint8_t id = labels.at<std::uint8_t>(y, x)) labelled[id].add(x, y);
+    }
+  }
   tracks.clear();
   for (const Candidate& each : found) {
     MovingObject object;
     object.id = each.track.id;
     object.age = each.track.age + 1;
     object.current_from_previous = each.back.inverse();
-    Group group;
-    for (const Pixel& p : each.label.pixels) {
-      if (labels.at<std::uint8_t>(p.y, p.x) == object.id) group.add(p.x, p.y);
-    }
+    const Group& group = labelled[static_cast<std::size_t>(object.id)];
     if (group.pixels.empty()) continue;
     describe(object, group, now.filled);
     object.velocity_m = object.centre_m - motion->current_from_previous * (each.back * object.centre_m);

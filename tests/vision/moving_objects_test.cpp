@@ -213,6 +213,32 @@ TEST(MovingObjects, ImagesOf16BitsAndMapsWithoutValues) {
   EXPECT_TRUE(is_empty(black));
 }
 
+/// Marks with gaps make several candidates of one vehicle, which share pixels.
+TEST(MovingObjects, PixelsThatCandidatesShareCountOnce) {
+  ObjectTracker tracker(street().calibration());
+  bool has_any = false;
+  for (int k = kFirst; k < kFirst + kFrames; ++k) {
+    const SyntheticFrame images = street().render(k);
+    Image marked = images.left_moving.clone();
+    for (int y = 0; y < marked.rows; ++y) {
+      for (int x = 0; x < marked.cols; ++x) {
+        if (x % 32 < 8) marked.at<std::uint8_t>(y, x) = 0;
+      }
+    }
+    const LabelledObjects found = tracker.process(images.left, images.left_disparity, marked, street().motion(k));
+    for (const MovingObject& object : found.moving) {
+      int pixels = 0;
+      for (int y = 0; y < marked.rows; ++y) {
+        const std::uint8_t* row = found.labels.row(y);
+        pixels += static_cast<int>(std::count(row, row + marked.cols, object.id));
+      }
+      EXPECT_EQ(object.pixels, pixels) << "object " << object.id << " of frame " << k;
+      has_any = true;
+    }
+  }
+  EXPECT_TRUE(has_any);
+}
+
 TEST(MovingObjects, RefusalsLeaveTheState) {
   EXPECT_THROW(ObjectTracker(Calibration{}), InvalidArgument);
   ObjectTracker tracker(street().calibration());
