@@ -28,6 +28,11 @@ struct Package {
   std::function<std::shared_ptr<vision::FrameSource>(const BagArguments& bag, const std::string& calib,
                                                      vision::FrameRange range, const std::string& out)>
       open_bag;
+  /// The frames of two videos, or of one of both views (`right` is empty), that lie in `range`, of a run that writes to
+  /// `out`.
+  std::function<std::shared_ptr<vision::FrameSource>(const VideoArguments& videos, const std::string& calib,
+                                                     vision::FrameRange range, const std::string& out)>
+      open_videos;
   CalibrationReader read_calibration;
   /// A recording, unless `file` is empty, and a viewer.
   std::function<std::shared_ptr<FrameSink>(const std::string& file, bool viewer)> take;

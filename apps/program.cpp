@@ -127,7 +127,7 @@ int parse_and_run(int argc, const char* const* argv, const Package* package) {
                                     const std::string& why_not) -> std::optional<Calibration> {
     become_python(argc, argv, why_not);
   };
-  const Package hooks = package ? *package : Package{take_over, {}, read_calibration, {}};
+  const Package hooks = package ? *package : Package{take_over, {}, {}, read_calibration, {}};
   const Command commands[] = {
       add_run(program, hooks),      add_eval(program),    add_devices(program), add_synth(program),
       add_odometry(program, hooks), add_compile(program), add_tune(program)};

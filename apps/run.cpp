@@ -58,7 +58,8 @@ int run(const RunArguments& arguments, const Package& package) {
 }  // namespace
 
 Command add_run(CLI::App& program, const Package& package) {
-  CLI::App* command = program.add_subcommand("run", "Disparity and variance for every frame of a stereo sequence");
+  CLI::App* command = program.add_subcommand(
+      "run", "Disparity and variance for every frame of a stereo sequence: a folder, two pictures, a bag, or videos");
   auto arguments = std::make_shared<RunArguments>();
   arguments->add_to(*command);
   return {command, [arguments, package] { return run(*arguments, package); }};

@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -22,18 +23,20 @@ namespace egosgm::app {
 namespace {
 
 std::shared_ptr<vision::FrameSource> source_of(const RunArguments& arguments, const Package& package) {
-  if (arguments.bag.bag.empty()) {
+  const std::optional<VideoArguments> videos = arguments.input.videos();
+  if (arguments.bag.bag.empty() && !videos) {
     return std::make_shared<vision::FileSource>(
         arguments.input.open(/*needs_calibration=*/false, package.read_calibration));
   }
+  const vision::FrameRange range =
+      arguments.input.frames.empty() ? vision::FrameRange{} : vision::parse_frame_range(arguments.input.frames);
+  if (arguments.bag.bag.empty()) return package.open_videos(*videos, arguments.input.calib, range, arguments.out);
   SequenceArguments others = arguments.input;
   others.calib = others.frames = "";
   if (!others.text().empty()) {
     throw InvalidArgument("more than one input: --bag " + arguments.bag.bag + " and " + others.text() +
                           ": give one of them");
   }
-  const vision::FrameRange range =
-      arguments.input.frames.empty() ? vision::FrameRange{} : vision::parse_frame_range(arguments.input.frames);
   return package.open_bag(arguments.bag, arguments.input.calib, range, arguments.out);
 }
 
@@ -72,7 +75,7 @@ void expect_takeable(const RunArguments& arguments, const SequenceJob& job) {
 
 OutputFolder folder_of(const RunArguments& arguments, const SequenceJob& job) {
   std::vector<std::string> files = output_files(job.kinds, job.source->sequence(), job.options);
-  if (job.source->has_no_files()) files.emplace_back(kRunCalibration);
+  if (job.source->has_no_files() && job.source->sequence().has_calibration) files.emplace_back(kRunCalibration);
   return {arguments.out, arguments.resume, files};
 }
 
@@ -133,7 +136,8 @@ SequenceJob RunArguments::job(const Package& package) const {
     throw InvalidArgument(option + ": is of a bag: give --bag BAG with it");
   }
   if (package.take_over) {
-    const std::string why = rerun ? "--rerun" : has_recording() ? "--out " + out : bag.bag;
+    const std::optional<VideoArguments> videos = input.videos();
+    const std::string why = rerun ? "--rerun" : has_recording() ? "--out " + out : videos ? videos->left : bag.bag;
     if (!why.empty()) package.take_over(why);
   }
   job.source = source_of(*this, package);

@@ -101,7 +101,7 @@ class Run {
       save_config();
       pipeline_.prepare(source_.type(), outputs_->views());
       waiting_.reset();
-      if (has_folder() && source_.has_no_files()) {
+      if (has_folder() && source_.has_no_files() && sequence_.has_calibration) {
         vision::write_calibration(folder_.path() / kRunCalibration, sequence_.calibration);
       }
       if (sink_) sink_->begin(pipeline_.options(), sequence_.calibration);

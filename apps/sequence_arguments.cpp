@@ -11,6 +11,7 @@
 #include "egosgm/vision/calibration_io.h"
 #include "vision/file_kinds.h"
 #include "vision/folder_contents.h"
+#include "vision/foreign_file.h"
 
 namespace egosgm::app {
 namespace {
@@ -66,6 +67,18 @@ void SequenceArguments::add_to(CLI::App& command) {
             "Python package, of whichever program");
   add_pair_by(command, pair_by, heading);
   input.add("--frames", frames, "FIRST:LAST", "frame numbers, both ends included: 7:10, 7:, :10 or 7; without: all");
+}
+
+std::optional<VideoArguments> SequenceArguments::videos() const {
+  const bool is_pair = folder.empty() && other_picture.empty();
+  const VideoArguments named = is_pair ? VideoArguments{left, right} : VideoArguments{folder, other_picture};
+  if (!vision::is_video(named.left) || (is_pair && right.empty())) return std::nullopt;
+  SequenceArguments others = *this;
+  others.calib = others.frames = "";
+  (is_pair ? others.left : others.folder).clear();
+  (is_pair ? others.right : others.other_picture).clear();
+  if (others.text().empty()) return named;
+  throw InvalidArgument("more than one input: " + named.left + " and " + others.text() + ": give one of them");
 }
 
 vision::StereoSequence SequenceArguments::open(bool needs_calibration, const CalibrationReader& read) const {

@@ -17,6 +17,11 @@ namespace egosgm::app {
 using CalibrationReader =
     std::function<std::optional<Calibration>(const std::string& file, vision::Size size, const std::string& why_not)>;
 
+/// The videos of both cameras, or one of both views, whose `right` is empty.
+struct VideoArguments {
+  std::string left, right;
+};
+
 /// The arguments that say which stereo sequence to read.
 struct SequenceArguments {
   std::string kitti, scene, odometry, folder, other_picture, left, right, calib, pair_by, frames;
@@ -25,6 +30,8 @@ struct SequenceArguments {
   /// Throws InvalidArgument unless exactly one sequence was named, and as the openers do, and where the sequence has no
   /// calibration and `needs_calibration`. `read`: for calibrations of other programs, where somebody reads them.
   vision::StereoSequence open(bool needs_calibration = true, const CalibrationReader& read = {}) const;
+  /// The videos that are named in place of a sequence; none where it is no video.
+  std::optional<VideoArguments> videos() const;
   /// The arguments, as a shell takes them for any command that reads a sequence.
   std::string text() const;
 

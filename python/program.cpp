@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The program in this process, which the package feeds with bags, and whose maps it shows.
+// The program in this process, which the package feeds with bags and videos, and whose maps it shows.
 #include "apps/program.h"
 
 #include <fmt/core.h>
@@ -55,18 +55,20 @@ class Held {
   py::object object_;
 };
 
-/// egosgm.bag.program.BagSource.
-class BagSource : public vision::FrameSource {
+/// egosgm.bag.program.BagSource or VideoSource.
+class PackageSource : public vision::FrameSource {
  public:
-  BagSource(py::object bag, vision::FrameRange range, const std::string& out) : bag_(std::move(bag)), range_(range) {
-    sequence_.title = text_from(bag_["title"]);
-    sequence_.note = text_from(bag_["note"]);
-    sequence_.calibration = bag_["calibration"].cast<Calibration>();
-    size_ = {bag_["width"].cast<int>(), bag_["height"].cast<int>()};
-    type_ = bag_["bits"].cast<int>() == 8 ? PixelType::kU8 : PixelType::kU16;
-    poses_ = text_from(bag_["poses"]);
+  PackageSource(py::object source, vision::FrameRange range, const std::string& out)
+      : source_(std::move(source)), range_(range) {
+    sequence_.title = text_from(source_["title"]);
+    sequence_.note = text_from(source_["note"]);
+    sequence_.has_calibration = source_["has_calibration"].cast<bool>();
+    sequence_.calibration = source_["calibration"].cast<Calibration>();
+    size_ = {source_["width"].cast<int>(), source_["height"].cast<int>()};
+    type_ = source_["bits"].cast<int>() == 8 ? PixelType::kU8 : PixelType::kU16;
+    poses_ = text_from(source_["poses"]);
     out_ = out;
-    const int count = bag_["count"].cast<int>(), first = range.first.value_or(0);
+    const int count = source_["count"].cast<int>(), first = range.first.value_or(0);
     if (first >= count) {
       throw InvalidArgument(
           fmt::format("--frames: {} has at most {} frames, which begin with 0", sequence_.title, count));
@@ -82,7 +84,7 @@ class BagSource : public vision::FrameSource {
   std::optional<vision::VideoPair> next() override {
     return in_python([&]() -> std::optional<vision::VideoPair> {
       for (;;) {
-        const py::object found = bag_.call("next");
+        const py::object found = source_.call("next");
         if (found.is_none()) {
           if (has_given_) return std::nullopt;
           throw InvalidArgument(
@@ -96,7 +98,7 @@ class BagSource : public vision::FrameSource {
         pair.frame = frame_of(number);
         pair.images = {mat_of(found.attr("left"), "left"), mat_of(found.attr("right"), "right")};
         pair.starts_anew = found.attr("starts_anew").cast<bool>();
-        pair.stamp_ns = found.attr("stamp_ns").cast<std::int64_t>();
+        pair.stamp_ns = found.attr("stamp_ns").cast<std::optional<std::int64_t>>();
         pair.camera = found.attr("frame_id").cast<std::string>();
         const py::object pose = found.attr("world_from_camera");
         if (!pose.is_none()) pair.world_from_camera = transform_of(pose, "pose");
@@ -106,13 +108,13 @@ class BagSource : public vision::FrameSource {
   }
 
   bool has_lost_images() const override {
-    return in_python([&] { return bag_["has_lost_images"].cast<bool>(); });
+    return in_python([&] { return source_["has_lost_images"].cast<bool>(); });
   }
 
   std::vector<std::string> notes() const override {
     return in_python([&] {
       std::vector<std::string> notes;
-      for (const py::handle& note : bag_.call("notes")) notes.push_back(text_from(note));
+      for (const py::handle& note : source_.call("notes")) notes.push_back(text_from(note));
       return notes;
     });
   }
@@ -126,11 +128,11 @@ class BagSource : public vision::FrameSource {
     return frame;
   }
 
-  const Held bag_;
+  const Held source_;
   const vision::FrameRange range_;
   std::filesystem::path out_;
   std::string poses_;
-  int last_ = -1;  // frame that the bag gave
+  int last_ = -1;  // frame that the source gave
   bool has_given_ = false;
 };
 
@@ -231,7 +233,14 @@ int main_of(const std::vector<std::string>& arguments, const py::object& package
       py::list info_topics;
       for (const std::string& topic : given.info_topics) info_topics.append(text_of(topic));
       values["info_topics"] = info_topics;
-      return std::make_shared<BagSource>(package.attr("BagSource")(**values), range, out);
+      return std::make_shared<PackageSource>(package.attr("BagSource")(**values), range, out);
+    });
+  };
+  hooks.open_videos = [&](const app::VideoArguments& videos, const std::string& calib, vision::FrameRange range,
+                          const std::string& out) {
+    return in_python([&]() -> std::shared_ptr<vision::FrameSource> {
+      return std::make_shared<PackageSource>(
+          package.attr("VideoSource")(text_of(videos.left), text_of(videos.right), text_of(calib)), range, out);
     });
   };
   hooks.take = [&](const std::string& file, bool viewer) {

@@ -14,10 +14,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kRectify = ", which `egosgm rectify` reads, with the cameras' calibration";
-constexpr const char* kLive =
-    "it names a live camera: in Python, egosgm.run takes a generator of its pairs; or record both, and `egosgm "
-    "rectify` "
-    "reads the videos";
+constexpr const char* kVideo = "it is a video, which `egosgm run` and `rectify` read, with the cameras' calibration";
+constexpr const char* kLive = "it names a live camera, which `egosgm live` reads; in Python, egosgm.live.LivePairs";
 
 constexpr const char* kWeb =
     "it is an address of the web: download what it holds, and unpack it; in Python, egosgm.run takes a generator of a "
@@ -49,11 +47,11 @@ std::string foreign_kind(std::string_view start) {
       {4, "ftyphei", photo},
       {4, "ftypmif1", photo},
       {4, "ftypavif", photo},
-      {4, "ftyp", std::string("it is a video") + kRectify},
+      {4, "ftyp", kVideo},
       {0, "GIF8", "it is a GIF: write its pictures as PNG"},
       {0, "\x93NUMPY", "it is an array of NumPy: in Python, egosgm.run takes pairs of images; or write them as PNG"},
-      {8, "AVI ", std::string("it is a video") + kRectify},
-      {0, "\x1a\x45\xdf\xa3", std::string("it is a video") + kRectify},
+      {8, "AVI ", kVideo},
+      {0, "\x1a\x45\xdf\xa3", kVideo},
       {0, "II*\0"sv, std::string("it is a TIFF") + kRectify},
       {0, "MM\0*"sv, std::string("it is a TIFF") + kRectify},
       {8, "WEBP", std::string("it is a WebP") + kRectify},
@@ -78,6 +76,16 @@ std::string foreign_kind(std::string_view start) {
     if (start.size() > kind.at && start.substr(kind.at).starts_with(kind.bytes)) return kind.meaning;
   }
   return {};
+}
+
+bool is_video(const fs::path& file) {
+  std::error_code error;
+  if (!fs::is_regular_file(file, error)) return false;
+  try {
+    return foreign_kind(read_file_start(file, kKindBytes)) == kVideo;
+  } catch (const Error&) {  // it cannot be read, as its reader will say
+    return false;
+  }
 }
 
 std::string foreign_input(const fs::path& path) {

@@ -6,6 +6,8 @@
 #include <string>
 #include <string_view>
 
+#include "egosgm/export.h"
+
 namespace egosgm::vision {
 
 inline constexpr std::size_t kKindBytes = 300;  // of a file, which tell its kind
@@ -13,6 +15,9 @@ inline constexpr std::size_t kKindBytes = 300;  // of a file, which tell its kin
 /// What a file is that people give in place of an image or of a sequence, by its first bytes, and what to do with it:
 /// "it is a zip archive: unpack it". Empty where that is not known. Thread-safe.
 std::string foreign_kind(std::string_view start);
+
+/// Whether it is a file of a video. Thread-safe.
+EGOSGM_EXPORT bool is_video(const std::filesystem::path& file);
 
 /// The same of a path that is no folder: what it holds, or the camera that it names. Thread-safe.
 std::string foreign_input(const std::filesystem::path& path);

@@ -17,6 +17,11 @@ from .geometry.depth import depth_sigma_from_disparity
 from .calibration.rectification import StereoRig
 
 
+def any_calibration(width: int, height: int) -> _egosgm.Calibration:
+    """In place of one that is not known: nothing is predicted then, so that any one does."""
+    return _egosgm.Calibration(width, width, width / 2, height / 2, 1)
+
+
 @dataclasses.dataclass(frozen=True, repr=False, eq=False)
 class VideoFrame:
     """A frame of a drive: images, maps and what happened."""
@@ -158,9 +163,7 @@ class StereoVideo:
             yield left, right, None, False
 
     def _pipeline(self, width: int, height: int) -> _egosgm.Pipeline:
-        """Without a calibration, nothing is predicted: any one does."""
-        calibration = self.calibration or _egosgm.Calibration(width, width, width / 2, height / 2, 1)
-        return _egosgm.Pipeline(calibration, width, height, **self._options)
+        return _egosgm.Pipeline(self.calibration or any_calibration(width, height), width, height, **self._options)
 
     def _tell(self, text: str) -> None:
         warnings.warn(text, UserWarning, stacklevel=4)

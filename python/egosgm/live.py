@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 """egosgm live: two cameras, or one that gives both views, matched and shown as they come. In Python: LivePairs."""
-import argparse
 import atexit
 import collections
 import contextlib
@@ -58,8 +57,7 @@ class LivePairs:
         first = next(self._stream, None)
         if first is None:
             raise _egosgm.InvalidArgument(f"the input has no pair{': ' * bool(self._source.note)}{self._source.note}")
-        self.rectifier = Rectifier(argparse.Namespace(euroc=None, calib=[calib] if isinstance(calib, str) else calib, unit=unit_m, fisheye=fisheye, alpha=0.0),
-                                   first.left.shape[1::-1])
+        self.rectifier = Rectifier([calib] if isinstance(calib, str) else calib, first.left.shape[1::-1], unit_m, fisheye)
         self.rectifier(RawPair(first.left, first.right))  # a pair of its own: the first one is rectified when it is asked for
         self.calibration, self.dropped = self.rectifier.calibration, 0
         self._newest: Optional[RawPair] = first

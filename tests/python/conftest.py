@@ -33,3 +33,24 @@ def street_folder(street, frames, tmp_path):
     (folder / "calib.txt").write_text("".join(
         f"P{i}: {c.fx} 0 {c.cx} {-c.fx * c.baseline_m * (i % 2)} 0 {c.fy} {c.cy} 0 0 0 1 0\n" for i in range(4)))
     return folder
+
+
+@pytest.fixture
+def calib(street, tmp_path):
+    file = tmp_path / "calib.txt"
+    egosgm._egosgm._write_new_calibration(file, street.calibration)
+    return str(file)
+
+
+@pytest.fixture
+def videos(frames, tmp_path):
+    """Both cameras as videos without loss, and one of both views."""
+    cv2 = pytest.importorskip("cv2")
+    files = [str(tmp_path / name) for name in ("left.avi", "right.avi", "both.avi")]
+    for file, of in zip(files, (lambda f: f.left, lambda f: f.right, lambda f: np.hstack([f.left, f.right]))):
+        images = [cv2.cvtColor(of(frame), cv2.COLOR_GRAY2BGR) for frame in frames]
+        writer = cv2.VideoWriter(file, cv2.VideoWriter_fourcc(*"FFV1"), 4, images[0].shape[1::-1])
+        for image in images:
+            writer.write(image)
+        writer.release()
+    return files

@@ -24,26 +24,6 @@ WIDTH, HEIGHT, FRAMES, SEED = 320, 96, 3, 7
 OPTIONS = dict(disparities=48, paths=4)
 
 
-@pytest.fixture
-def calib(street, tmp_path):
-    file = tmp_path / "calib.txt"
-    egosgm._egosgm._write_new_calibration(file, street.calibration)
-    return str(file)
-
-
-@pytest.fixture
-def videos(frames, tmp_path):
-    """Both cameras as videos without loss, and one of both views."""
-    files = [str(tmp_path / name) for name in ("left.avi", "right.avi", "both.avi")]
-    for file, of in zip(files, (lambda f: f.left, lambda f: f.right, lambda f: np.hstack([f.left, f.right]))):
-        images = [cv2.cvtColor(of(frame), cv2.COLOR_GRAY2BGR) for frame in frames]
-        writer = cv2.VideoWriter(file, cv2.VideoWriter_fourcc(*"FFV1"), 4, images[0].shape[1::-1])
-        for image in images:
-            writer.write(image)
-        writer.release()
-    return files
-
-
 class Camera:
     """In place of cv2.VideoCapture: images, then it calls `ends` and has none. What it is asked for goes into `asked`."""
 

@@ -454,7 +454,7 @@ TEST_F(DatasetTest, WhatIsGivenInPlaceOfAFolderIsNamed) {
   add_text("HD720.svo2", "x");
   expect_refused([&] { open_folder(root_ / "HD720.svo2"); }, {"recording of a ZED", "ZED_SVO_Export"});
   for (const char* camera : {"0", "/dev/video77", "rtsp://camera/left"}) {
-    expect_refused([&] { open_folder(camera); }, {camera, "it names a live camera"});
+    expect_refused([&] { open_folder(camera); }, {camera, "it names a live camera, which `egosgm live` reads"});
   }
   expect_refused([&] { open_folder("https://x.org/drive.zip"); }, {"an address of the web: download"});
   expect_refused([&] { open_folder(root_ / "left/*.png"); }, {"it is a pattern: give --left PATTERN"});

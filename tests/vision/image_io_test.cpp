@@ -239,7 +239,7 @@ TEST_F(ImageIo, NonImagesAreRefused) {
 TEST_F(ImageIo, WhatIsGivenInPlaceOfAnImageIsNamed) {
   const std::pair<std::string, std::string> kinds[] = {
       {"version https://git-lfs.github.com/spec/v1\noid sha256:0\n", "git lfs pull"},
-      {std::string("\0\0\0\x18", 4) + "ftypmp42", "is a video, which `egosgm rectify` reads"},
+      {std::string("\0\0\0\x18", 4) + "ftypmp42", "is a video, which `egosgm run` and `rectify` read"},
       {"RIFF0000AVI LIST", "is a video"},
       {std::string("II*\0", 4) + "12345678", "is a TIFF"},
       {"P5\n2 2\n255\n1234", "is a PGM"},

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 """egosgm rectify: raw pairs in, a rectified sequence out, in the layout that all other commands read."""
-import argparse
 import itertools
 import os
 import pathlib
@@ -63,22 +62,23 @@ def _parser() -> Parser:
 class Rectifier:
     """What a pair goes through: rectification, or nothing where the images are rectified already."""
 
-    def __init__(self, given: argparse.Namespace, size: Optional[Tuple[int, int]]) -> None:
-        self._alpha, self.rectification = given.alpha, None
+    def __init__(self, calib: Optional[Sequence[str]], size: Optional[Tuple[int, int]], unit_m: Optional[float] = None, fisheye: bool = False,
+                 alpha: float = 0.0, euroc: Optional[str] = None) -> None:
+        self._alpha, self.rectification = alpha, None
         self.rig: Optional[StereoRig] = None
-        if given.euroc:
-            if given.calib or given.unit is not None or given.fisheye:
+        if euroc:
+            if calib or unit_m is not None or fisheye:
                 raise _egosgm.InvalidArgument("--euroc has its own calibration: leave --calib, --unit and --fisheye out, or give --left and --right")
-            self.rig = read_euroc_rig(given.euroc)
+            self.rig = read_euroc_rig(euroc)
             return
-        if not given.calib:
+        if not calib:
             raise _egosgm.InvalidArgument("no calibration: give --calib FILE; `egosgm calibrate` finds one by pictures of a board, and rectified pictures need "
                                           "none: `egosgm run LEFT RIGHT`")
-        found = find(given.calib, given.unit, given.fisheye, size)
+        found = find(calib, unit_m, fisheye, size)
         if isinstance(found, StereoRig):
             self.rig = found
-        elif given.alpha:
-            raise _egosgm.InvalidArgument(f"--alpha {given.alpha:g}: {' '.join(given.calib)} is of rectified images, which stay as they are: leave it out")
+        elif alpha:
+            raise _egosgm.InvalidArgument(f"--alpha {alpha:g}: {' '.join(calib)} is of rectified images, which stay as they are: leave it out")
         else:
             self.calibration = found
 
@@ -166,7 +166,7 @@ def main(arguments: Sequence[str]) -> int:
     pairs = open_pairs(given.left, given.right, given.side_by_side, given.top_bottom, given.list, given.euroc, given.pair_by == "order")
     stream = iter(pairs)
     first = next(stream, None)
-    rectifier = Rectifier(given, first.left.shape[1::-1] if first else None)
+    rectifier = Rectifier(given.calib, first.left.shape[1::-1] if first else None, given.unit, given.fisheye, given.alpha, given.euroc)
     expect_new_folder("--out", pathlib.Path(given.out))
     folder = SequenceFolder(pathlib.Path(given.out))
     stops: List[int] = []

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+"""egosgm run of videos: the maps are those of the sequence that egosgm rectify makes of them."""
+import numpy as np
+import pytest
+
+import egosgm
+from egosgm.bag import program as bag_program
+from egosgm.program import run_tool
+cv2 = pytest.importorskip("cv2")
+
+WIDTH, HEIGHT, FRAMES, SEED = 320, 96, 3, 7
+SET = ["--set", "disparities=48", "--set", "paths=4"]
+
+
+@pytest.fixture
+def told(capfd):
+    """Runs a command, which returns `code`: what it said."""
+    def run(*words, code=0):
+        assert run_tool([str(word) for word in words]) == code
+        said = capfd.readouterr()
+        return said.err if code else said.out
+    return run
+
+
+@pytest.fixture
+def rig(tmp_path):
+    """Of raw images."""
+    matrix = np.array([[300, 0, 170], [0, 300, 50], [0, 0, 1.0]])
+    file = str(tmp_path / "rig.yml")
+    storage = cv2.FileStorage(file, cv2.FILE_STORAGE_WRITE)
+    values = dict(M1=matrix, D1=np.array([[-0.1, 0.02, 0, 0, 0]]), M2=matrix, D2=np.zeros((1, 5)), R=np.eye(3), T=np.array([[-0.25], [0.0], [0.0]]))
+    for name, value in values.items():
+        storage.write(name, value)
+    storage.release()
+    return file
+
+
+def files_of(folder):
+    return {file.name: file.read_bytes() for file in [*sorted((folder / "disparity").iterdir()), folder / "poses.txt"]}
+
+
+@pytest.mark.parametrize("is_one", [False, True])
+@pytest.mark.parametrize("is_raw", [False, True])
+def test_the_maps_are_those_of_the_rectified_sequence(is_one, is_raw, videos, calib, rig, tmp_path, told):
+    calibration = ["--calib", rig if is_raw else calib]
+    as_run, as_rectified = ([videos[2]], ["--side-by-side", videos[2]]) if is_one else (videos[:2], ["--left", videos[0], "--right", videos[1]])
+    said = told("run", *as_run, *calibration, "--out", tmp_path / "out", *SET)
+    assert ("the images are rectified here" in said) == is_raw and ("half of an image" in said) == is_one
+    told("rectify", *as_rectified, *calibration, "--out", tmp_path / "sequence")
+    told("run", tmp_path / "sequence", "--out", tmp_path / "expected", *SET)
+    found = files_of(tmp_path / "out")
+    assert found == files_of(tmp_path / "expected") and len(found) == FRAMES + 1
+    assert len(list((tmp_path / "out/left").iterdir())) == FRAMES
+
+
+def test_without_a_calibration_there_are_disparities_and_no_poses(videos, tmp_path, told):
+    told("run", "--left", videos[0], "--right", videos[1], "--frames", "1:", "--out", tmp_path / "out", *SET)
+    assert [file.name for file in sorted((tmp_path / "out/disparity").iterdir())] == ["000001.png", "000002.png"]
+    assert not (tmp_path / "out/poses.txt").exists() and not (tmp_path / "out/calibration.txt").exists()
+    assert egosgm.read_disparity(tmp_path / "out/disparity/000001.png").shape == (HEIGHT, WIDTH)
+
+
+def test_a_video_of_one_camera_is_refused_with_the_command_that_reads_it(videos, tmp_path, told):
+    file = str(tmp_path / "it's.avi")
+    writer = cv2.VideoWriter(file, cv2.VideoWriter_fourcc(*"FFV1"), 4, (160, 90))
+    writer.write(np.zeros((90, 160, 3), np.uint8))
+    writer.release()
+    said = told("run", file, "--out", tmp_path / "out", code=2)
+    assert "160x90, as of one camera" in said and "egosgm rectify --side-by-side '" in said and said.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_video_is_one_input(videos, calib, tmp_path, told):
+    for more, named in ((["--left", "x.png"], "--left x.png"), (["--odometry", "x"], "--odometry x"), (["--bag", "x.mcap"], "x.mcap")):
+        assert "more than one input" in (said := told("run", videos[2], *more, "--out", tmp_path / "out", code=2)) and named in said
+
+
+def test_images_beyond_the_count_are_left_out_and_told(videos):
+    source = bag_program.VideoSource(videos[0], videos[1], "")
+    source.count = FRAMES - 1
+    assert [source.next().number for _ in range(FRAMES - 1)] == [0, 1]
+    assert source.next() is None and "more than the 2 images that it says" in source.notes()[0]
