@@ -148,6 +148,14 @@ class EvalPoses(ProgramTest):
         poses.write_text("1 0 0 0 0 1 0 0 0 0 1 0\n" * 3)
         self.assertIn("0.000 m = - %", self.assert_works("eval-poses", poses, poses))
 
+    def test_a_file_that_is_compared_with_itself_is_told(self):
+        truth, near = self.street / "poses.txt", self.new_folder() / "poses.txt"
+        rows = truth.read_text().splitlines()
+        near.write_text("\n".join([*rows[:-1], rows[-1].rsplit(" ", 1)[0] + " 9"]))
+        for estimate, is_told in ((truth, True), (near, False)):
+            self.assertEqual("is a file compared with itself" in self.assert_works("eval-poses", estimate, self.street), is_told)
+            self.assertEqual("warnings" in json.loads(self.assert_works("eval-poses", estimate, self.street, "--json")), is_told)
+
     def test_a_part_of_the_sequence_against_the_whole_truth(self):
         truth, out = self.street / "poses.txt", self.new_folder() / "out"
         self.assert_works("run", self.street, "--frames", "1:3", "--poses", truth, "--disparities", 48, "--out", out, "--quiet")

@@ -97,7 +97,11 @@ def _work(arguments: Sequence[str]) -> str:
     evaluation = evaluate_poses(estimate, truth)
     for file in given.plot:
         plots.write_plot(file, plots.paths(estimate, truth))
-    return json_text(_json_of(evaluation)) if given.json else _text_of(evaluation)
+    is_same = np.array_equal(estimate, truth)
+    warnings = ["the estimate equals the truth in every pose: is a file compared with itself, or with a copy of it?"] * is_same
+    if given.json:
+        return json_text({**_json_of(evaluation), **({"warnings": warnings} if warnings else {})})
+    return "\n".join([_text_of(evaluation), *warnings])
 
 
 def main(arguments: Sequence[str]) -> int:
