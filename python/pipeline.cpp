@@ -25,6 +25,10 @@ py::dict arrays_to_fill(const py::object& wanted, int width, int height) {
     arrays.attr("update")(wanted);
     return arrays;
   }
+  if (!py::isinstance<py::iterable>(wanted)) {
+    throw InvalidArgument("outputs is a " + py::str(py::type::of(wanted).attr("__name__")).cast<std::string>() +
+                          ": give names of maps, or a dict of arrays to fill");
+  }
   for (const py::handle& item : py::isinstance<py::str>(wanted) ? py::make_tuple(wanted) : py::tuple(wanted)) {
     const auto name = py::str(item).cast<std::string>();
     arrays[item] = py::array_t<float>({height, width});  // views_of refuses a name that no output has

@@ -83,14 +83,19 @@ class StereoVideo:
                  calibration: "_egosgm.Calibration | str | os.PathLike[str] | None" = None, *, frames: str = "", motion: bool = True,
                  outputs: Union[str, Sequence[str]] = ("disparity", "variance"), odometry: Optional[Dict[str, Any]] = None, lag: int = 1,
                  progress: Optional[bool] = None, objects: bool = False, **options: Any) -> None:
+        for name, value, kinds, choice in (("frames", frames, str, 'give text, such as "7:10"'),
+                                           ("motion", motion, (int, np.bool_), "choose True or False; Pipeline.process takes motions that are known"),
+                                           ("objects", objects, (int, np.bool_), "choose True or False"),
+                                           ("outputs", outputs, Iterable, 'give names of maps, such as ("disparity", "variance")'),
+                                           ("odometry", odometry, (dict, type(None)), "give a dict of StereoOdometry's options")):
+            if not isinstance(value, kinds):  # type: ignore[arg-type]
+                raise _egosgm.InvalidArgument(f"{name}: is a {type(value).__name__}: {choice}")
         if isinstance(source, (str, os.PathLike)):
             source = _egosgm.open_folder(source, frames)
         elif frames:
             raise _egosgm.InvalidArgument(f"frames={frames!r}: only a folder's are chosen here")
         if not hasattr(source, "__iter__") and not isinstance(source, (_egosgm.StereoSequence, Bag)):
             raise _egosgm.InvalidArgument(f"source: is a {type(source).__name__}: give a folder, a sequence, a bag, or pairs of images")
-        if not isinstance(motion, (int, np.bool_)):
-            raise _egosgm.InvalidArgument(f"motion: is a {type(motion).__name__}: choose True or False; Pipeline.process takes motions that are known")
         self.sequence = source if isinstance(source, _egosgm.StereoSequence) else None
         if calibration is None and self.sequence is not None:
             _egosgm._expect_calibrated(self.sequence)
@@ -112,8 +117,6 @@ class StereoVideo:
             raise _egosgm.InvalidArgument(f"lag={lag!r}: choose 1, the device works while the next pair comes, or 0, a frame comes before the next pair is asked for")
         self._source, self._outputs, self._lag, self._options = source, outputs, int(lag), options
         self._bar = _bar(progress)
-        if odometry is not None and not isinstance(odometry, dict):
-            raise _egosgm.InvalidArgument(f"odometry: is a {type(odometry).__name__}: give a dict of StereoOdometry's options")
         self._odometry_options = (odometry or {}) if motion and calibration is not None else None
         if odometry and self._odometry_options is None:
             raise _egosgm.InvalidArgument("odometry: has options, but without a calibration, or with motion=False, there is none: leave them out")
@@ -152,7 +155,10 @@ class StereoVideo:
         first: Tuple[int, ...] = ()
         for number, pair in enumerate(self._source):  # type: ignore[arg-type]
             if not isinstance(pair, (tuple, list)) or len(pair) != 2:
-                raise _egosgm.InvalidArgument(f"pair {number}: is a {type(pair).__name__}: give (left, right), each an image")
+                of = f" of {len(pair)}" if isinstance(pair, (tuple, list)) else ""
+                raise _egosgm.InvalidArgument(f"pair {number}: is a {type(pair).__name__}{of}: give (left, right), each an image")
+            if any(image is None for image in pair):
+                raise _egosgm.InvalidArgument(f"pair {number}: holds None in place of an image, as a camera or cv2.imread gives where it has none: leave it out")
             left, right = (np.array(image) for image in pair)  # copies: a camera may use its buffers again before the frame is handed out
             if not first and left.ndim >= 2 and os.path.isfile(self._calibration_file):
                 read_calibration(self._calibration_file, size=left.shape[1::-1])  # refused where it is of another size

@@ -217,11 +217,14 @@ def test_what_is_wrong_is_said_before_a_frame_is_read(street_folder):
 def test_what_is_no_pair_and_no_calibration_is_said(street, frames):
     with pytest.raises(egosgm.InvalidArgument, match="calibration: is a tuple: give an egosgm.Calibration"):
         egosgm.run([], (700, 700, 320, 240, 0.1))
-    for wrong, named in ((dict(source=None), "source: is a NoneType"), (dict(odometry=[1]), "odometry: is a list"), (dict(lag=np.arange(2)), "choose 1")):
+    for wrong, named in ((dict(source=None), "source: is a NoneType"), (dict(odometry=[1]), "odometry: is a list"), (dict(lag=np.arange(2)), "choose 1"),
+                         (dict(outputs=3), "outputs: is a int: give names"), (dict(outputs=None), "outputs: is a NoneType"), (dict(frames=3), "frames: is a int"),
+                         (dict(frames=(0, 1)), "frames: is a tuple"), (dict(objects="no"), "objects: is a str: choose True")):
         with pytest.raises(egosgm.InvalidArgument, match=named):
             egosgm.run(**{"source": [], **wrong})
-    for source, named in (([frames[0].left], "pair 0: is a ndarray"), ([(frames[0].left, frames[0].right), (frames[0].left,)], "pair 1: is a tuple"),
-                          ([(frames[0].left, None)], "right is no array")):
+    for source, named in (([frames[0].left], "pair 0: is a ndarray"), ([(frames[0].left, frames[0].right), (frames[0].left,)], "pair 1: is a tuple of 1"),
+                          ([(frames[0].left, None)], "pair 0: holds None"), ([(frames[0].left, frames[0].right, 0.1)], "pair 0: is a tuple of 3"),
+                          ([(frames[0].left, "right.png")], "right is no array")):
         with pytest.raises(egosgm.InvalidArgument, match=named):
             list(egosgm.run(source, street.calibration, **OPTIONS))
 

@@ -154,7 +154,7 @@ def test_wrong_outputs_and_motions_are_refused(pipeline, frames):
     left, right = frames[0].left, frames[0].right
     read_only = np.zeros((HEIGHT, WIDTH), np.float32)
     read_only.flags.writeable = False
-    for outputs, named in (("disparities", "choose from disparity"), ((5,), "choose from disparity"), ({"disparity": read_only}, "read-only"),
+    for outputs, named in (("disparities", "choose from disparity"), ((5,), "choose from disparity"), (3, "outputs is a int: give names"), ({"disparity": read_only}, "read-only"),
                            ({"disparity": np.zeros((HEIGHT, WIDTH))}, "float32"), ({"variance": np.zeros((3, 4), np.float32)}, ""),
                            ({"disparity": [[1.0]]}, "no NumPy array"),
                            ({"disparity": np.zeros((HEIGHT, 2 * WIDTH), np.float32)[:, ::2]}, "contiguous")):
