@@ -65,15 +65,20 @@ def _frame_key(name: str) -> str:
 def read_motions(folder: _Path) -> _Motions:
     """The 4x4 motions to the next camera's frame, by frame and object, of a folder's objects.csv, or of motions.txt: rows of a frame, an id and 12 numbers."""
     rows: List[List[str]] = []
-    if (folder / "objects.csv").is_file():
-        with open(folder / "objects.csv", newline="", encoding="utf-8") as table:
-            rows = [[row["frame"], row["id"], *(row[f"m{i}{j}"] for i in range(3) for j in range(4))] for row in csv.DictReader(table)]
-    elif (folder / "motions.txt").is_file():
-        rows = [line.split() for line in (folder / "motions.txt").read_text(encoding="utf-8").splitlines() if line.strip()]
+    motions: _Motions = {}
     try:
-        return {(_frame_key(row[0]), int(row[1])): np.vstack([np.array(row[2:], float).reshape(3, 4), [0, 0, 0, 1]]) for row in rows}
-    except ValueError as error:
+        if (folder / "objects.csv").is_file():
+            with open(folder / "objects.csv", newline="", encoding="utf-8") as table:
+                rows = [[row["frame"], row["id"], *(row[f"m{i}{j}"] for i in range(3) for j in range(4))] for row in csv.DictReader(table)]
+        elif (folder / "motions.txt").is_file():
+            rows = [line.split() for line in (folder / "motions.txt").read_text(encoding="utf-8").splitlines() if line.strip()]
+        for row in rows:
+            motion = motions[_frame_key(row[0]), int(row[1])] = np.vstack([np.array(row[2:], float).reshape(3, 4), [0, 0, 0, 1]])
+            if not np.isfinite(motion).all():
+                raise ValueError(f"object {row[1]} of frame {row[0]} has no finite motion")
+    except (ValueError, LookupError, csv.Error) as error:
         raise _egosgm.InvalidArgument(f"{folder}: objects.csv or motions.txt is damaged: {error}; give it as `egosgm run --write objects` writes it") from None
+    return motions
 
 
 def motion_errors(estimate: np.ndarray, truth: np.ndarray, centre_m: np.ndarray) -> Tuple[float, float]:

@@ -107,6 +107,9 @@ def test_motions_come_from_a_table_or_rows(tmp_path):
     assert read_motions(tmp_path) == {}
     (tmp_path / "motions.txt").write_text("10 3 1 0 0 5 0 1 0 6 0 0 1 7\n\n")
     assert list(read_motions(tmp_path)) == [("10", 3)]
-    (tmp_path / "motions.txt").write_text("10 3 1 0\n")
-    with pytest.raises(egosgm.InvalidArgument, match="is damaged"):
-        read_motions(tmp_path)
+    names = f"frame,id,{names}\n"
+    for file, text in (("motions.txt", "10 3 1 0\n"), ("motions.txt", "10\n"), ("objects.csv", "000010,3,1,0,0,5\n000011,3,1,0,0,5\n"), ("objects.csv", names + "10,3,1,0,0\n"),
+                       ("objects.csv", names + "10,3,1,0,0,5,0,1,0,6,0,0,nan,7\n")):
+        (tmp_path / file).write_text(text)
+        with pytest.raises(egosgm.InvalidArgument, match="is damaged"):
+            read_motions(tmp_path)
