@@ -5,6 +5,8 @@ EGOSGM_BUILD names the build folder, EGOSGM_CXX the compiler, EGOSGM_HAS_VISION 
 """
 import os
 import pathlib
+import re
+import shutil
 import subprocess
 import tempfile
 import unittest
@@ -42,18 +44,30 @@ class Installed(unittest.TestCase):
     def library_folder(self):
         return next(self.prefix.rglob("libegosgm.so")).parent
 
-    def configure(self, *arguments):
+    def configure(self, *arguments, source=SOURCE):
         build = pathlib.Path(tempfile.mkdtemp(dir=self.folder))
-        return build, run("cmake", "-S", SOURCE, "-B", build, f"-DCMAKE_PREFIX_PATH={self.prefix}", f"-DVISION={VISION}", f"-DOPENCV={OPENCV}",
+        return build, run("cmake", "-S", source, "-B", build, f"-DCMAKE_PREFIX_PATH={self.prefix}", f"-DVISION={VISION}",
                           f"-DCMAKE_CXX_COMPILER={CXX}", "-DCMAKE_BUILD_TYPE=Debug", *arguments)
 
+    def page_project(self):
+        """The lines of docs/use/coming-from.md as a project."""
+        page = (SOURCE.parents[1] / "docs/use/coming-from.md").read_text()
+        (code, cmake), folder = re.findall(r"```c\w+\n(.*?)```", page, re.DOTALL), pathlib.Path(tempfile.mkdtemp(dir=self.folder))
+        includes, _, lines = code.partition("\n\n")
+        shutil.copy(SOURCE / "opencv.cpp", folder)
+        (folder / "page_includes.h").write_text(includes + "\n")
+        (folder / "page_lines.inc").write_text(lines)
+        (folder / "CMakeLists.txt").write_text("cmake_minimum_required(VERSION 3.22)\nproject(page CXX)\nset(CMAKE_CXX_STANDARD 17)\nadd_executable(YOURS opencv.cpp)\n" + cmake)
+        return folder
+
     def test_cmake_finds_both_kinds_of_library(self):
-        for kind, shared in (("shared", "ON"), ("static", "OFF")):
-            with self.subTest(kind):
-                build, done = self.configure(f"-DBUILD_SHARED_LIBS={shared}")
+        projects = [(SOURCE, PROGRAMS)] + ([(self.page_project(), ["YOURS"])] if OPENCV else [])
+        for kind, shared, source, programs in [(*of, *project) for of in (("shared", "ON"), ("static", "OFF")) for project in projects]:
+            with self.subTest(kind, source=source):
+                build, done = self.configure(f"-DBUILD_SHARED_LIBS={shared}", source=source)
                 self.assertEqual(done.returncode, 0, done.stdout)
                 self.assert_runs("cmake", "--build", build)
-                for program in PROGRAMS + ["opencv"] * OPENCV:
+                for program in programs:
                     self.assert_runs(build / program, cwd=build)
                     needed = self.assert_runs("readelf", "-d", build / program)
                     self.assertEqual("[libegosgm" in needed, kind == "shared", needed)

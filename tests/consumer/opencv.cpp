@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// A project that has OpenCV.
-#include <egosgm/vision/matcher.h>
+// A project that has OpenCV, whose matcher is the lines of docs/use/coming-from.md.
 #include <egosgm/vision/synthetic.h>
+
+#include "page_includes.h"
 
 int main() {
   egosgm::vision::SyntheticOptions options;
@@ -10,8 +11,7 @@ int main() {
   options.height = 32;
   const egosgm::vision::SyntheticFrame frame = egosgm::vision::SyntheticSequence(options).render(0);
   const cv::Mat left = egosgm::vision::mat_of(frame.left), right = egosgm::vision::mat_of(frame.right);
-  const cv::Ptr<cv::StereoMatcher> matcher = cv::makePtr<egosgm::vision::Matcher>();  // without OpenCV's calib3d
-  cv::Mat steps;
-  matcher->compute(left, right, steps);
-  return cv::countNonZero(steps > 0) > 0 ? 0 : 1;
+  cv::Mat disparity;
+#include "page_lines.inc"
+  return matcher->getNumDisparities() == 128 && cv::countNonZero(disparity > 0) > 0 ? 0 : 1;
 }
