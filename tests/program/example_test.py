@@ -28,8 +28,8 @@ class Example(ExampleTest):
         poses = self.street / "poses.txt"
         self.assert_gives_what_the_program_gives("own_poses", ["--poses", poses], [poses])
 
-    def test_the_readme_shows_it(self):
-        shown = (SOURCE / "README.md").read_text().split("```cpp\n")[1].split("```")[0]
+    def test_the_page_shows_it(self):
+        shown = (SOURCE / "docs/use/cpp.md").read_text().split("```cpp\n")[1].split("```")[0]
         self.assertEqual(shown, re.sub("^//.*\n", "", (SOURCE / "examples/minimal.cpp").read_text(), flags=re.MULTILINE))
 
     def test_the_comparison_names_tests_that_exist(self):
