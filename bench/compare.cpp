@@ -10,7 +10,7 @@
 
 #include "bench/inputs.h"
 #include "bench/opencv_matcher.h"
-#include "bench/report.h"
+#include "bench/turns.h"
 #include "egosgm/error.h"
 #include "egosgm/named_options.h"
 #include "egosgm/odometry.h"
@@ -415,7 +415,7 @@ void print_ratios(const std::vector<Row>& rows) {
 }
 
 int run(int argc, char** argv) {
-  const Arguments arguments = parse_arguments(argc, argv, kHelp, 11, Turns::kRandom);
+  const Arguments arguments = parse_turns(argc, argv, kHelp, 11, Turns::kRandom);
   const std::vector<Place> where = places(arguments);
   const std::vector<shared::ImageSize> all_sizes{{640, 480}, {1242, 375}, {1920, 1080}};
   const std::vector<int> all_ranges{64, 128, 256};

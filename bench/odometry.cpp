@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "bench/report.h"
+#include "bench/turns.h"
 #include "egosgm/vision/dataset.h"
 #include "egosgm/vision/image.h"
 #include "egosgm/vision/synthetic.h"
@@ -84,7 +84,7 @@ void play(benchmark::State& state, const Video& video) {
 }
 
 int run(int argc, char** argv) {
-  const Arguments arguments = parse_arguments(argc, argv, kHelp, 5);
+  const Arguments arguments = parse_turns(argc, argv, kHelp, 5, Turns::kOneAfterAnother);
   const Video video = load_video();
   const shared::ImageSize size{video.frames.front().left.cols, video.frames.front().left.rows};
   benchmark::RegisterBenchmark(benchmark_name("odometry_frame", size, 0).c_str(),

@@ -8,7 +8,6 @@
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
-#include <map>
 #include <sstream>
 #include <stdexcept>
 
@@ -52,37 +51,6 @@ std::optional<std::string> value_of(const char* name, int argc, char** argv, int
   return argv[++i];
 }
 
-/// Keeps Google Benchmark's runs as rows and prints a line each.
-class RowReporter : public benchmark::BenchmarkReporter {
- public:
-  explicit RowReporter(std::vector<Row>& rows) : rows_(rows) {}
-
-  bool ReportContext(const Context&) override { return true; }
-
-  void ReportRuns(const std::vector<Run>& runs) override {
-    if (runs.empty() || runs.front().run_type == Run::RT_Aggregate) return;
-    Row row;
-    char name[128];
-    if (std::sscanf(runs.front().run_name.function_name.c_str(), "%127[^/]/%dx%d/%d", name, &row.size.width,
-                    &row.size.height, &row.disparities) != 4) {
-      throw std::logic_error("not a name of bench/: " + runs.front().run_name.function_name);
-    }
-    row.name = name;
-    std::vector<double> ms;
-    std::map<std::string, std::vector<double>> counters;
-    for (const Run& run : runs) {
-      ms.push_back(1e3 * run.real_accumulated_time / static_cast<double>(run.iterations));
-      for (const auto& [counter, value] : run.counters) counters[counter].push_back(value);
-    }
-    row.median_ms = median(ms);
-    for (auto& [counter, values] : counters) row.more.emplace_back(counter, median(values));
-    add_row(std::move(row), rows_);
-  }
-
- private:
-  std::vector<Row>& rows_;
-};
-
 std::string quoted(const std::string& text) {
   std::string result = "\"";
   for (const char c : text) {
@@ -117,12 +85,11 @@ std::string now() {
 
 }  // namespace
 
-Arguments parse_arguments(int argc, char** argv, const char* help, int default_rounds, Turns turns) {
+void refuse_argument(const std::string& argument) { refuse(argument + ": no such argument: see --help"); }
+
+Arguments parse_arguments(int argc, char** argv, const char* help, int default_rounds, std::vector<char*>* rest) {
   Arguments arguments;
   arguments.rounds = default_rounds;
-  char random_turns[] = "--benchmark_enable_random_interleaving=true";
-  std::vector<char*> rest{argv[0]};
-  if (turns == Turns::kRandom) rest.push_back(random_turns);
   for (int i = 1; i < argc; ++i) {
     if (std::strcmp(argv[i], "--help") == 0) {
       std::fputs(help, stdout);
@@ -146,29 +113,17 @@ Arguments parse_arguments(int argc, char** argv, const char* help, int default_r
       arguments.cases = *cases;
     } else if (const auto setting = value_of("--set", argc, argv, i)) {
       arguments.settings.push_back(*setting);
+    } else if (rest) {
+      rest->push_back(argv[i]);
     } else {
-      rest.push_back(argv[i]);
+      refuse_argument(argv[i]);
     }
   }
-  int count = static_cast<int>(rest.size());
-  benchmark::Initialize(&count, rest.data());
-  if (count > 1) refuse(std::string(rest[1]) + ": no such argument: see --help");
   // PoCL 3 reads the first, later ones the second. What the caller has set stays.
   const std::string threads = std::to_string(arguments.threads);
   setenv("POCL_MAX_PTHREAD_COUNT", threads.c_str(), 0);
   setenv("POCL_CPU_MAX_CU_COUNT", threads.c_str(), 0);
   return arguments;
-}
-
-std::string benchmark_name(const std::string& name, shared::ImageSize size, int disparities) {
-  return name + "/" + std::to_string(size.width) + "x" + std::to_string(size.height) + "/" +
-         std::to_string(disparities);
-}
-
-void run_registered(std::vector<Row>& rows) {
-  RowReporter reporter(rows);
-  benchmark::RunSpecifiedBenchmarks(&reporter);
-  benchmark::ClearRegisteredBenchmarks();
 }
 
 void add_row(Row row, std::vector<Row>& rows) {

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the three programs share: arguments, Google Benchmark's runs as rows, and their JSON.
+// What the programs share: arguments, rows and their JSON.
 #pragma once
-
-#include <benchmark/benchmark.h>
 
 #include <optional>
 #include <string>
@@ -26,14 +24,12 @@ struct Arguments {
   std::vector<std::string> settings;      // --set NAME=VALUE, repeated (egosgm_compare)
 };
 
-/// How the rounds of what is registered together follow one another.
-enum class Turns { kOneAfterAnother, kRandom };
-
-/// Takes its arguments out of argv and gives the rest to Google Benchmark (--benchmark_filter=..., ...). Ends the
-/// program with `help` for --help, and with one line on stderr for what it does not know. Call it before anything
-/// touches OpenCL: PoCL reads the number of its threads once, from the environment.
+/// Takes its arguments out of argv. Ends the program with `help` for --help, and with one line on stderr for what it
+/// does not know, where that does not go to `rest`. Call it before anything touches OpenCL: PoCL reads the number of
+/// its threads once, from the environment.
 Arguments parse_arguments(int argc, char** argv, const char* help, int default_rounds,
-                          Turns turns = Turns::kOneAfterAnother);
+                          std::vector<char*>* rest = nullptr);
+[[noreturn]] void refuse_argument(const std::string& argument);
 
 /// What was measured: one row of the tables.
 struct Row {
@@ -43,12 +39,6 @@ struct Row {
   double median_ms = 0;                              // wall clock
   std::vector<std::pair<std::string, double>> more;  // counters of the benchmark, by name; medians
 };
-
-/// Names "NAME/WxH/D" as Google Benchmark filters them.
-std::string benchmark_name(const std::string& name, shared::ImageSize size, int disparities);
-
-/// Runs what is registered under such names, forgets it, and appends a row each.
-void run_registered(std::vector<Row>& rows);
 
 /// Prints a row and appends it.
 void add_row(Row row, std::vector<Row>& rows);

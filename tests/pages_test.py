@@ -71,6 +71,14 @@ class Pages(ProgramTest):
             self.assertTrue(package.endswith(".whl"), f"{page}: {package} is on no index")
         self.assertEqual(list(of_pages(r'pip install (?:-\S+ )*("?egosgm)(?![\w/-])')), [])  # whose it would be, nobody knows
 
+    def test_what_keeps_windows_out_of_the_core_is_told(self):
+        files = [file for folder in ("host", "include") for file in (SOURCE / folder).rglob("*") if file.suffix in (".h", ".cpp")]
+        calls = {str(file.relative_to(SOURCE)) for file in files if re.search(r"^#include <(?:dlfcn|fcntl|pthread|unistd|poll|sys/\w+)\.h>", file.read_text(), re.M)}
+        attributes = {str(file.relative_to(SOURCE)) for file in files if "include" in file.parts and "__attribute__" in file.read_text()}
+        text = (SOURCE / "docs/use/send-your-device.md").read_text()
+        told = re.search(r"^Windows and macOS are kept out by.*?\n\n", text, re.M | re.S)[0]
+        self.assertEqual(set(re.findall(r"`((?:host|include)/[\w/.]+)`", told)), calls | attributes)
+
     def test_files_exist(self):
         for page, name in of_pages(rf"`((?:{FOLDERS})/[\w./-]+)`"):
             if "foo" in name or re.search(r"[A-Z]{4}", name) and "README" not in name:

@@ -79,6 +79,12 @@ class Scripts(unittest.TestCase):
             now, late = record("program", None, re.compile("^default"))
         self.assertEqual((list(now["runs"]), late, len(begun)), (["default", "default_paths", "default_16_bits"], [], 3))
 
+    def test_the_core_asks_for_few_packages(self):
+        done = self.called(SCRIPTS / "install-dependencies", "--core")
+        asked = re.search(r"(?:Installing|missing):((?: [a-z][a-z0-9.+-]+)+)", done.stdout + done.stderr)[1].split()
+        self.assertEqual(asked, "build-essential cmake ninja-build python3 ocl-icd-opencl-dev opencl-headers opencl-clhpp-headers pocl-opencl-icd libeigen3-dev "
+                                "nlohmann-json3-dev libgtest-dev libfmt-dev".split())
+
     def test_a_word_too_many_is_refused(self):
         for name, arguments in {"install-dependencies": ["--program", "again"], "format": ["--check", "all"], "measure": ["--build", "b", "c"],
                                 "build-site": ["now"], "try-arm": ["now"], "lanes": ["asan", "usan"], "build-wheel": ["python9.9"]}.items():
@@ -212,6 +218,13 @@ class InAnyOrder(unittest.TestCase):
         stub.write_text(f"#!/bin/sh\n[ \"$1\" != --build ] || {{ shift 2; echo \"would build: $*\"; exit 99; }}\nexec {shutil.which('cmake')} \"$@\"\n")
         stub.chmod(0o755)
         self.environment = dict(os.environ, PATH=f"{stub.parent}:{os.environ['PATH']}", PYTHONDONTWRITEBYTECODE="1")
+
+    def test_the_core_is_configured_without_what_only_others_need(self):
+        """What `install-dependencies --core` leaves out."""
+        absent = [f"-DCMAKE_DISABLE_FIND_PACKAGE_{name}=ON" for name in ("OpenCV", "benchmark", "PNG", "JPEG", "ZLIB", "CLI11", "pybind11", "ISAL")]
+        done = subprocess.run(["cmake", "-S", self.checkout, "-B", self.checkout / "build-device", "-DEGOSGM_VISION=OFF", *absent], env=self.environment,
+                              capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
 
     def configured(self, script, *arguments):
         """What the cache says after a call of a script that came as far as building."""
