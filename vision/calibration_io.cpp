@@ -322,6 +322,7 @@ std::string_view foreign_format(std::string_view text) {
       {{"Q:"}, "a matrix Q of OpenCV's stereoRectify"},
   }};
   if (text.starts_with("\xff\xfe") || text.starts_with("\xfe\xff")) return "UTF-16, which is to be saved as UTF-8";
+  if (text.size() > 1 && (text[0] == '\0') != (text[1] == '\0')) return "UTF-16, which is to be saved as UTF-8";
   if (text.starts_with("\x1f\x8b")) return "packed by gzip";
   if (text.starts_with("PK\x03\x04")) return "an archive of NumPy arrays (.npz)";
   if (text.starts_with("\x93NUMPY")) return "one NumPy array";
@@ -333,6 +334,8 @@ std::string_view foreign_format(std::string_view text) {
   if (text.starts_with("%YAML")) return "a YAML file of OpenCV";
   const std::size_t begin = text.find_first_not_of(" \t\r\n");
   if (begin == std::string_view::npos) return {};
+  if (text[begin] == '[' && text.find('=') != std::string_view::npos)
+    return "INI or TOML, whose rows stand in sections";
   if (text[begin] == '{' || text[begin] == '[') return "JSON";
   if (text[begin] == '<') return "XML, as OpenCV writes it";
   const std::vector<std::string_view> numbers = split_tokens(text.substr(0, text.find('\n')));

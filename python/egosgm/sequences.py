@@ -53,7 +53,10 @@ def open_input(given: argparse.Namespace) -> Opened:
         found.append(find(given.calib, size=size))
         return found[0] if isinstance(found[0], _egosgm.Calibration) else None
 
-    sequence = _egosgm._open_input([text_argument(word) for word in words_of_input(given)], read)
+    first = argparse.Namespace(**{**vars(given), "calib": given.calib[:1]}) if given.calib else given
+    sequence = _egosgm._open_input([text_argument(word) for word in words_of_input(first)], read)
+    if given.calib and not found and given.calib[1:]:  # the first is EgoSGM's own
+        find(given.calib)
     return Opened(sequence, found[0] if found else sequence.calibration)
 
 

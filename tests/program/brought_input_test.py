@@ -224,7 +224,7 @@ class KnownFormats(Brought):
                  "EuRoC or Kimera": "T_BS:\n  rows: 4\n  data: [1]\nintrinsics: [1, 2, 3, 4]\n",
                  "ORB-SLAM": "%YAML:1.0\nCamera.fx: 460.0\n", "DSEC": "disparity_to_depth:\n  cams_12:\n  - [1.0]\n",
                  "Cityscapes": '{"extrinsic": {"baseline": 0.3}, "intrinsic": {"fx": 460, "u0": 319.5}}',
-                 "K.txt": "460.0 0.0 319.5 0.0 460.0 239.5 0.0 0.0 1.0\n0.3\n", "JSON": '{"a": 1}', "OpenCV's stereo calibration": '{"K1": [[1]], "K2": [[1]]}'}
+                 "K.txt": "460.0 0.0 319.5 0.0 460.0 239.5 0.0 0.0 1.0\n0.3\n", "JSON": '{"a": 1}', "INI or TOML": "[left]\nfx = 460\n", "OpenCV's stereo calibration": '{"K1": [[1]], "K2": [[1]]}'}
         program, environment = self.without_package()
         for named, text in texts.items():
             file = self.new_folder() / "calib.yaml"

@@ -234,6 +234,17 @@ class Doctor(InputTest):
         self.assertGreater(abs(float(finding["text"].split()[2])), 2)
         self.assertIn("rectified here by", self.examine(*patterns, "--calib", turned, code=2)["images"]["text"])
 
+    def test_a_calibration_may_be_a_file_for_each_camera(self):
+        f, cx, cy, baseline = self.calibration()
+        patterns = "--left", self.street / "image_0/%06d.png", "--right", self.street / "image_1/%06d.png"
+        files = [self.new_folder() / name for name in ("a.yaml", "b.yaml")]  # of no names that tell the side
+        for file, tx in zip(files, (0, -f * baseline)):
+            camera = {"image_width": WIDTH, "image_height": HEIGHT, "k": [f, 0, cx, 0, f, cy, 0, 0, 1], "d": [0] * 5, "r": [1, 0, 0, 0, 1, 0, 0, 0, 1],
+                      "p": [f, 0, cx, tx, 0, f, cy, 0, 0, 0, 1, 0]}
+            file.write_text(json.dumps(camera))
+        self.assertIn(f"baseline {baseline:.4g} m", self.examine(*patterns, "--calib", *files)["calibration"]["text"])
+        self.assert_refused(["doctor", *patterns, "--calib", self.street / "calib.txt", files[1]], "calib.txt: is not the calibration of one camera")
+
     def test_a_wrong_sign_hides_nothing_else(self):
         street = self.shifted(2)
         f, cx, cy, baseline = self.calibration()

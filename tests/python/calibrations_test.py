@@ -313,7 +313,7 @@ def test_virtual_kitti(tmp_path):
 
 @pytest.mark.parametrize("content, named", [
     (b"\x80\x04\x95", "a pickle of Python"), (b"MATLAB 5.0 MAT-file", "a file of MATLAB"), (b"\x89HDF\r\n", "a file of MATLAB"),
-    ("fx = 460\n".encode("utf-16"), "is UTF-16"),
+    ("fx = 460\n".encode("utf-16"), "is UTF-16"), ("fx: 460\ncx: 320\n".encode("utf-16-le"), "is UTF-16"), (b"<!DOCTYPE html>\n<html><body/></html>", "is a web page"),
 ])
 def test_files_that_are_no_text(content, named, tmp_path):
     (tmp_path / "calib").write_bytes(content)
@@ -382,6 +382,10 @@ def test_a_fisheye(tmp_path):
     (RAW["orb_slam3_raw.yaml"].replace("Camera2.k1", "Camera2.k"), "lacks Camera2.k1"),
     (f"f: {F}\nB: {B}\n", "lacks cx and cy, the principal point"), (f"f: {F}\nB: {B}\nwidth: 640\nheight: 480\n", "the middle would be cx 319.5, cy 239.5"),
     ("fov: 90\nbaseline: 0.3\n", "nothing tells the images' size"), ("fov: 1.5708\nbaseline: 0.3\nwidth: 640\nheight: 480\n", "in radians (90 degrees)"),
+    (f"fx: {F}\nfy: 460,0\ncx: {CX}\ncy: {CY}\nbaseline: {B}\n", "its fy is '460,0', not one finite number"),
+    (f"fx: {F}\ncx: {CX}\ncy: {CY}\nbaseline: 300 mm\n", "its baseline is '300 mm', not one finite number: write it with a decimal point and without a unit"),
+    (RAW["nested.yaml"].replace("- - 460.0", "- - 460,0"), "its left_matrix and right_matrix are not of finite numbers"),
+    (kalibr(T_cn_cnm1=SHIFT, resolution=[1280, 960]), "of two resolutions, 640x480 and 1280x960"),
     ("hfov: 69.7\nwidth: 640\nheight: 480\n", "lacks the baseline"),
     (RECTIFIED["orb_slam2.yaml"].replace(f"fx: {F}", "fx: -1"), "calib.yaml: calibration: fx is -1"),
 ])

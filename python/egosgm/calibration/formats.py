@@ -10,7 +10,7 @@ from typing import Any, Dict, List, Optional, Tuple, Union
 import numpy as np
 
 from .. import _egosgm
-from .parts import Camera, Matrix, Values, data_of, expect_size, expect_upright, matrix, of_four, refuse, rotation, size_of, text_of, transform
+from .parts import Camera, Matrix, Values, data_of, expect_size, expect_upright, matrix, of_four, one_resolution, refuse, rotation, size_of, text_of, transform
 from .rectification import StereoRig
 
 Found = Union[StereoRig, _egosgm.Calibration]
@@ -39,7 +39,7 @@ def kalibr(data: Dict[str, Any], file: pathlib.Path) -> StereoRig:
         right_from_left = np.linalg.inv(second.matrix((4, 4), "T_imu_cam")) @ first.matrix((4, 4), "T_imu_cam")
     else:
         raise chain.refuse(" and lacks T_cn_cnm1, where the second camera stands")
-    return chain.pair(cameras, right_from_left, first.resolution())
+    return chain.pair(cameras, right_from_left, one_resolution(first, second))
 
 
 def euroc(files: List[pathlib.Path], contents: List[Dict[str, Any]]) -> StereoRig:
@@ -47,7 +47,7 @@ def euroc(files: List[pathlib.Path], contents: List[Dict[str, Any]]) -> StereoRi
     both = [Values(data, file, "one camera of EuRoC or Kimera") for file, data in zip(files, contents)]
     cameras = [(of_four(camera.matrix((4,), "intrinsics")),
                 *camera.lens(camera.data.get("distortion_coefficients"), str(camera.data.get("distortion_model", "")))) for camera in both]
-    return both[0].pair_on_body(cameras, [camera.matrix((4, 4), "T_BS") for camera in both], both[0].resolution())
+    return both[0].pair_on_body(cameras, [camera.matrix((4, 4), "T_BS") for camera in both], one_resolution(*both))
 
 
 class _Info:
@@ -325,6 +325,16 @@ def _coefficients(value: Any, name: str, is_fisheye: bool, file: pathlib.Path) -
     return numbers
 
 
+_SHAPES = "3x3 of a matrix and of R (or a vector of 3), 3 of T"
+
+
+def _number(value: Any, name: str, what: str, file: pathlib.Path) -> float:
+    found = matrix(value, (1,))
+    if found is None:
+        raise refuse(file, f"is {what}, and its {name} is '{str(value)[:40]}', not one finite number: write it with a decimal point and without a unit (lengths in metres)")
+    return float(found[0])
+
+
 _NUMBERS = ("fx", "fy", "cx", "cy", "right_cx", "baseline", "baseline_mm", "fov", "vertical_fov")
 
 
@@ -374,10 +384,12 @@ def by_names(data: Dict[str, Any], file: pathlib.Path, what: str, is_fisheye: bo
     if q is not None and len(missing) >= 2:
         expect_size(size, images_size, file)
         return of_q(q, file)
-    numbers = {name: float(value[0]) for name in _NUMBERS if (value := matrix(found.get(name), (1,))) is not None}
-    if not {"fx", "fov", "vertical_fov"}.isdisjoint(numbers):
+    if not {"fx", "fov", "vertical_fov"}.isdisjoint(found):
+        numbers = {name: _number(found[name], name, what, file) for name in _NUMBERS if name in found}
         expect_size(size, images_size, file)
         return _of_numbers(numbers, size or images_size, file, what)
+    if all(name in found for name in missing):
+        raise refuse(file, f"is {what}, and its {' and '.join(missing)} {'are' if missing[1:] else 'is'} not of finite numbers, {_SHAPES}: does a decimal comma part one of them?")
     there = ", ".join(str(key) for key in list(data)[:12])
     raise refuse(file, f"is {what} ({there}) and lacks {', '.join(missing)}: a stereo calibration has the matrix and the distortion of both cameras, "
                         "R and T, of finite numbers (M1, D1, M2, D2, R, T); that of rectified images fx, cx, cy and baseline")

@@ -145,6 +145,15 @@ class Values:
         return self.pair(cameras, np.linalg.inv(body_from[1]) @ body_from[0], size)
 
 
+def one_resolution(*cameras: Values) -> Any:
+    """Of all cameras: None where the first has none."""
+    first, *others = (camera.resolution() for camera in cameras)
+    for camera, other in zip(cameras[1:], others):
+        if None not in (size_of(first), size_of(other)) and size_of(first) != size_of(other):
+            raise camera.refuse(" of two resolutions, {}x{} and {}x{}: give both cameras' of one".format(*size_of(first), *size_of(other)))  # type: ignore[misc]
+    return first
+
+
 def of_four(numbers: Matrix) -> Matrix:
     fx, fy, cx, cy = numbers
     return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
@@ -193,7 +202,7 @@ def text_of(file: pathlib.Path) -> str:
     if content[:2] == b"\x1f\x8b":
         with contextlib.suppress(EOFError, OSError, zlib.error):
             content = gzip.GzipFile(fileobj=io.BytesIO(content)).read(MOST_BYTES)
-    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff") or 0 < content[:64].count(0) == len(content[:64]) // 2:
         raise refuse(file, "is UTF-16, as some editors write: save it as UTF-8")
     return content.decode("utf-8-sig", errors="replace")
 
@@ -207,6 +216,8 @@ def data_of(text: str, file: pathlib.Path) -> Any:
     _check_parts(text, file)
     start = text.lstrip()[:1]
     try:
+        if re.match(r"\s*<(!doctype\s+)?html", text, re.IGNORECASE):
+            raise refuse(file, "is a web page: was its download refused? Download the file itself")
         if start == "<":
             return _of_element(ElementTree.fromstring(text))
         return _expect_few_values(json.loads(text) if start in ("{", "[") and start else _yaml_of(text, file), file)

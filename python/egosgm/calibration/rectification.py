@@ -16,6 +16,7 @@ _LEAST_DISTANCE_M = 1e-6
 _MOST_ROTATION_ERROR = 1e-2  # files round to a few digits
 _MOST_FOCAL_DIFFERENCE, _MOST_ROWS_PX = 1e-3, 1e-2  # of P1 and P2, which round to a few digits, too
 _MOST_SIDE = 16384
+_LEAST_SCALE, _MOST_SCALE_ERROR = 1.15, 0.1  # of a camera matrix of images of another size: its centre and its focal length are scaled alike
 
 
 def _matrix_of(numbers: ArrayLike) -> _Matrix:
@@ -77,6 +78,13 @@ def _check_distortion(name: str, matrix: Any, is_fisheye: bool) -> None:
         raise _egosgm.InvalidArgument(f"{name}: needs 4{'' if is_fisheye else ', 5, 8, 12 or 14'} finite numbers")
 
 
+def _check_size(left: _Matrix, right: _Matrix) -> None:
+    scales = right[(0, 0, 1), (0, 2, 2)] / left[(0, 0, 1), (0, 2, 2)]  # of fx, cx, cy
+    scales = 1 / scales if scales[0] < 1 else scales
+    if scales.min() >= _LEAST_SCALE and np.ptp(scales) <= _MOST_SCALE_ERROR * scales.max():
+        raise _egosgm.InvalidArgument(f"M1 and M2 are of images of two sizes: fx, cx and cy of one are {scales.mean():.3g} times the other's; give both cameras' calibrations of one size")
+
+
 def _check_rotation(name: str, rotation: Any) -> None:
     if np.abs(rotation @ rotation.T - np.eye(3)).max() > _MOST_ROTATION_ERROR or not np.linalg.det(rotation) > 0:
         raise _egosgm.InvalidArgument(f"{name} is no rotation: its rows are not of length 1 and at right angles; give the calibration as it was computed")
@@ -104,6 +112,8 @@ def _check(rig: Any) -> None:
     _check_shape("R", rig.R, 3, 3)
     _check_shape("T", rig.T, 3, 1)
     _check_rotation("R", rig.R)
+    with np.errstate(all="ignore"):
+        _check_size(rig.left_matrix, rig.right_matrix)
     for name, matrix in zip(("R1", "R2", "P1", "P2"), rig.given or ()):
         _check_shape(name, matrix, 3, 3 if name[0] == "R" else 4)
         if name[0] == "R":
