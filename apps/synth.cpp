@@ -68,6 +68,8 @@ Command add_synth(CLI::App& program) {
                  "what has no texture: a sky, which is nothing in the truth, walls and ground; people and poles");
   group.add_flag("--moving-object", options.moving_object,
                  "vehicles that move on their own; with --plain people who walk");
+  group.add_flag("--traffic", options.traffic,
+                 "with --moving-object also an oncoming car, one that turns off, and somebody who walks across");
   group.add("--speed", options.speed_m, "M", "travel per frame [m]");
   group.add("--turn", options.turn_deg, "DEG", "largest turn per frame [deg]");
   group.add("--exposure", options.exposure, "F", "scale of the grey values before noise; night: 0.08");

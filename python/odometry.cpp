@@ -41,6 +41,7 @@ void for_each_field(SyntheticOptions& o, Visit&& visit) {
   visit("seed", o.seed);
   visit("plain", o.plain);
   visit("moving_object", o.moving_object);
+  visit("traffic", o.traffic);
   visit("moving_object_scale", o.moving_object_scale);
   visit("speed_m", o.speed_m);
   visit("turn_deg", o.turn_deg);

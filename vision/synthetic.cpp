@@ -81,6 +81,9 @@ void SyntheticOptions::validate() const {
   require_range("pole_width_px", pole_width_px, 1, 20);
   require_range("pole_spacing_m", pole_spacing_m, 1, 1000);
   require_range("supersampling", supersampling, 1, 8);
+  if (traffic && (!moving_object || plain)) {
+    throw InvalidArgument("synthetic traffic: joins moving_object in a street that is not plain: choose that too");
+  }
   if (speed_m > 0 && speed_m < kSmallestRadius_m * std::abs(turn_deg) * synthetic::kDegrees) {
     throw InvalidArgument(text("synthetic turn_deg = ", turn_deg, " at speed_m = ", speed_m, " turns on less than ",
                                kSmallestRadius_m, " m: choose a turn of at most ",

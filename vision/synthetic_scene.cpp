@@ -10,6 +10,8 @@ namespace {
 constexpr double kTwoPi = 6.283185307179586;
 constexpr double kNodeStep_m = 0.25;
 constexpr double kRoadBegin_m = -60;
+constexpr int kCrossingFrames = 25,
+              kMostRounds = 126;  // of what crosses and of other traffic; then their ids come again
 constexpr double kCameraHeight_m = 1.65;
 constexpr double kSightBack_m = 40, kSightAhead_m = 600;
 constexpr double kFramesPerBend = 60;
@@ -251,7 +253,6 @@ std::vector<Solid> Street::solids(int frame) const {
 }
 
 void Street::add_moving(int frame, std::vector<Solid>& out) const {
-  constexpr int kCrossingFrames = 25;
   const double s = frame * options.speed_m, scale = options.moving_object_scale, length = 4.2;
   const double gap = 11 + 2 * std::sin(kTwoPi * frame / 45), weave = 1.2 * std::sin(kTwoPi * frame / 33);
   Solid ahead = place(Shape::kBox, Material::kVan, mix(options.seed, 31), s + gap + length / 2, weave, 0,
@@ -262,14 +263,53 @@ void Street::add_moving(int frame, std::vector<Solid>& out) const {
   const int round = frame / kCrossingFrames;
   const double part = static_cast<double>(frame % kCrossingFrames) / kCrossingFrames;
   const int side = (mix(options.seed, 32) + round) % 2 ? 1 : -1;
-  const double at = s + 10 - 4 * part, lateral = side * (-10 + 17 * part);
-  const uint32_t seed = mix(options.seed, 33 + round);
-  Solid body = place(Shape::kBox, Material::kBody, seed, at, lateral, 0, {1.6, 0.85, 3.4});
-  Solid cabin = place(Shape::kBox, Material::kCabin, seed, at, lateral, 0.85, {1.4, 0.55, 1.9});
+  add_car(static_cast<uint8_t>(2 + round % kMostRounds), mix(options.seed, 33 + round),
+          {s + 10 - 4 * part, side * (-10 + 17 * part), 1.0 * side, 0}, out);
+  if (options.traffic) add_traffic(frame, out);
+}
+
+void Street::add_traffic(int frame, std::vector<Solid>& out) const {
+  const int round = frame / kCrossingFrames, part = frame % kCrossingFrames;
+  const double begin = round * kCrossingFrames * options.speed_m;  // where the camera was then
+  const auto id = [&](int kind) {
+    return static_cast<uint8_t>(2 + kMostRounds + 3 * (round % (kMostRounds / 3)) + kind);
+  };
+  const uint32_t h = mix(mix(options.seed, 700), static_cast<uint32_t>(round));
+
+  // Oncoming, in the lane to the left.
+  const double oncoming_m = range(mix(h, 1), 0.7, 1.1);
+  add_car(id(0), mix(h, 2), {begin + 44 - oncoming_m * part, -2.6, 0, -1}, out);
+
+  // Drives ahead, and turns off on an arc.
+  const int side = mix(h, 3) % 2 ? 1 : -1;
+  const double radius_m = range(mix(h, 4), 5, 8), turned = 50 * kDegrees * part / kCrossingFrames;
+  add_car(id(1), mix(h, 5),
+          {begin + 22 + radius_m * std::sin(turned), side * (1.4 + radius_m * (1 - std::cos(turned))),
+           side * std::sin(turned), std::cos(turned)},
+          out);
+
+  // Slow: somebody walks across.
+  const double at = begin + range(mix(h, 6), 24, 30), lateral = -side * (3.5 - range(mix(h, 7), 0.08, 0.16) * part);
+  add_person(id(2), mix(h, 8), at, lateral, out);
+}
+
+void Street::add_car(uint8_t id, uint32_t seed, const OnRoad& where, std::vector<Solid>& out) const {
+  Solid body = place(Shape::kBox, Material::kBody, seed, where.s, where.lateral, 0, {1.6, 0.85, 3.4});
+  Solid cabin = place(Shape::kBox, Material::kCabin, seed, where.s, where.lateral, 0.85, {1.4, 0.55, 1.9});
   for (Solid* solid : {&body, &cabin}) {
-    solid->id = static_cast<uint8_t>(2 + round % 254);
+    solid->id = id;
     const double sine = solid->sin_heading, cosine = solid->cos_heading;
-    solid->sin_heading = side * cosine, solid->cos_heading = -side * sine;  // turned by a right angle
+    solid->sin_heading = sine * where.cos_turn + cosine * where.sin_turn;
+    solid->cos_heading = cosine * where.cos_turn - sine * where.sin_turn;
+    out.push_back(*solid);
+  }
+}
+
+void Street::add_person(uint8_t id, uint32_t seed, double s, double lateral, std::vector<Solid>& out) const {
+  Solid body = place(Shape::kEllipsoid, Material::kCloth, mix(seed, 3), s, lateral, 0, {0.5, 1.5, 0.35});
+  Solid head = place(Shape::kEllipsoid, Material::kCloth, mix(seed, 4), s, lateral, 1.45, {0.22, 0.28, 0.24});
+  for (Solid* solid : {&body, &head}) {
+    solid->id = id;
     out.push_back(*solid);
   }
 }
@@ -281,12 +321,7 @@ void Street::add_people(int frame, std::vector<Solid>& out) const {
     const uint32_t h = mix(mix(options.seed, 600), static_cast<uint32_t>(i));
     const double phase = 0.2 * (options.moving_object ? frame : 0) + kTwoPi * unit(mix(h, 1));
     const double lateral = (unit(mix(h, 2)) < 0.5 ? -1 : 1) * (3.0 + 0.7 * std::sin(phase));
-    Solid body = place(Shape::kEllipsoid, Material::kCloth, mix(h, 3), i * kApart_m, lateral, 0, {0.5, 1.5, 0.35});
-    Solid head = place(Shape::kEllipsoid, Material::kCloth, mix(h, 4), i * kApart_m, lateral, 1.45, {0.22, 0.28, 0.24});
-    for (Solid* solid : {&body, &head}) {
-      solid->id = options.moving_object ? static_cast<uint8_t>(1 + i % 255) : 0;
-      out.push_back(*solid);
-    }
+    add_person(options.moving_object ? static_cast<uint8_t>(1 + i % 255) : 0, h, i * kApart_m, lateral, out);
   }
 }
 

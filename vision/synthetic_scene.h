@@ -92,7 +92,14 @@ struct Street {
   Solid place(Shape shape, Material material, uint32_t seed, double s, double lateral, double bottom_m,
               const Eigen::Vector3d& size) const;
   void add_moving(int frame, std::vector<Solid>& out) const;
+  void add_traffic(int frame, std::vector<Solid>& out) const;
   void add_people(int frame, std::vector<Solid>& out) const;
+  /// A place on the road, and a turn to the right against its heading.
+  struct OnRoad {
+    double s, lateral, sin_turn, cos_turn;
+  };
+  void add_car(uint8_t id, uint32_t seed, const OnRoad& where, std::vector<Solid>& out) const;
+  void add_person(uint8_t id, uint32_t seed, double s, double lateral, std::vector<Solid>& out) const;
 
   std::vector<Solid> static_solids_;  // by s
 };

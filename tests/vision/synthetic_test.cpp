@@ -172,14 +172,16 @@ TEST(Synthetic, SceneFlowLeadsToTheNextFrameAndSaysWhatIsSeenThere) {
 
 TEST(Synthetic, ObjectsMoveAsTheirMotionsSay) {
   SyntheticOptions options = small_options();
-  options.frames = 30, options.moving_object = true;
+  options.frames = 30, options.moving_object = true, options.traffic = true;
   const SyntheticSequence sequence(options);
   int crossing = 0;
+  std::set<int> ids;
   for (int k = 0; k < 29; ++k) {
     const SyntheticSceneFlow flow = sequence.scene_flow(k), then = sequence.scene_flow(k + 1);
     Image uncounted = flow.objects.clone();
     for (const SyntheticObject& object : flow.moving) {
       crossing += object.id > 1;
+      ids.insert(object.id);
       for (const SyntheticObject& next : then.moving) {
         if (next.id != object.id) continue;
         EXPECT_TRUE((object.next_from_current * object.centre_m).isApprox(next.centre_m, 1e-9)) << object.id;
@@ -201,6 +203,26 @@ TEST(Synthetic, ObjectsMoveAsTheirMotionsSay) {
     EXPECT_TRUE(k == 24 || count_nonzero(uncounted) == 0) << "frame " << k << ": then a vehicle leaves the street";
   }
   EXPECT_GT(crossing, 10);
+  for (const int id : {1, 2, 128, 129, 130}) EXPECT_EQ(ids.count(id), 1u) << id;
+}
+
+TEST(Synthetic, TrafficTurnsComesAndWalks) {
+  SyntheticOptions options = small_options();
+  options.frames = 24, options.moving_object = true, options.traffic = true, options.turn_deg = 0;
+  const SyntheticSequence sequence(options);
+  bool comes = false, turns = false, walks = false;
+  for (int k = 0; k < 23; ++k) {
+    for (const SyntheticObject& object : sequence.scene_flow(k).moving) {
+      const Eigen::Isometry3d own = sequence.motion(k + 1).current_from_previous.inverse() * object.next_from_current;
+      const double turn = Eigen::AngleAxisd(own.linear()).angle(), speed = object.velocity_m.norm();
+      comes |= object.id == 128 && object.velocity_m.z() < -0.6;
+      turns |= object.id == 129 && turn > 0.02;
+      walks |= object.id == 130 && speed > 0.05 && speed < 0.2 && turn < 1e-9;
+    }
+  }
+  EXPECT_TRUE(comes);
+  EXPECT_TRUE(turns);
+  EXPECT_TRUE(walks);
 }
 
 /// Mean |left(x) - right(x - d - error)| over pixels that both cameras see, right linearly interpolated.
@@ -422,7 +444,8 @@ TEST(Synthetic, BadOptionsAreRefusedByName) {
                                                             {"pole_width_px", {.pole_width_px = 0}},
                                                             {"pole_spacing_m", {.pole_spacing_m = 0}},
                                                             {"supersampling", {.supersampling = 0}},
-                                                            {"moving_object_scale", {.moving_object_scale = 0}}};
+                                                            {"moving_object_scale", {.moving_object_scale = 0}},
+                                                            {"traffic", {.traffic = true}}};
   for (const auto& [name, options] : cases) {
     testing::expect_refused([&, options = options] { SyntheticSequence{options}; }, {name});
   }

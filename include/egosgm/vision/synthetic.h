@@ -22,6 +22,7 @@ struct EGOSGM_EXPORT SyntheticOptions {
   unsigned seed = 1;              // of street, texture and sensor noise
   bool plain = false;             // sky, ground and walls without texture, people, poles
   bool moving_object = false;  // a vehicle ahead, and from time to time one that crosses the road; plain: people walk
+  bool traffic = false;  // with moving_object also an oncoming car, one that turns off, and somebody who walks across
   double moving_object_scale = 1;  // size of the vehicle ahead, 0.5..8; 5 covers 30 to 45 % of the image
   double speed_m = 0.8;            // forward travel per frame [m], 0..3
   double turn_deg = 1.0;    // largest turn per frame [deg], -4..4, positive: to the right first; radius at least 15 m
