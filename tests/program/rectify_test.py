@@ -6,6 +6,7 @@ import os
 import re
 import shutil
 import struct
+import unittest.mock
 
 import cv2
 import numpy
@@ -14,7 +15,7 @@ from input_case import InputTest, read_grey, rotation, sampled, write_grey
 from program_case import FRAMES, HEIGHT, WIDTH, png
 
 
-def write_avi(file, images):
+def write_avi(file, images, is_bottom_up=False):
     """A video of raw frames."""
     height, width = images[0].shape
     pad = -3 * width % 4
@@ -25,9 +26,9 @@ def write_avi(file, images):
 
     main = struct.pack("<14I", 100000, 10 * size, 0, 0, len(images), 0, 1, size, width, height, 0, 0, 0, 0)
     stream = struct.pack("<4s4sIHHIIIIIIIIHHHH", b"vids", b"DIB ", 0, 0, 0, 0, 1, 10, 0, len(images), size, 0, 0, 0, 0, width, height)
-    frame = struct.pack("<IiiHHIIiiII", 40, width, height, 1, 24, 0, size, 0, 0, 0, 0)
+    frame = struct.pack("<IiiHHIIiiII", 40, width, height if is_bottom_up else -height, 1, 24, 0, size, 0, 0, 0, 0)
     head = chunk(b"LIST", b"hdrl" + chunk(b"avih", main) + chunk(b"LIST", b"strl" + chunk(b"strh", stream) + chunk(b"strf", frame)))
-    rows = [numpy.pad(numpy.repeat(image[::-1, :, None], 3, 2).reshape(height, -1), ((0, 0), (0, pad))) for image in images]
+    rows = [numpy.pad(numpy.repeat(image[::-1 if is_bottom_up else 1, :, None], 3, 2).reshape(height, -1), ((0, 0), (0, pad))) for image in images]
     movie = chunk(b"LIST", b"movi" + b"".join(chunk(b"00db", row.tobytes()) for row in rows))
     file.write_bytes(chunk(b"RIFF", b"AVI " + head + movie))
 
@@ -149,6 +150,18 @@ class Rectify(RectifyTest):
         self.assertGreater((read_grey(out / "valid.png") == 255).mean(), 0.98)  # alpha 0
         wide, _ = self.rectify(*self.PAIRS, "--alpha", 1, calib=self.opencv_yaml(given=False))
         self.assertLess((read_grey(wide / "valid.png") == 255).mean(), 0.95)
+
+    def test_a_raw_video_whose_last_row_is_first(self):
+        """OpenCV 5 writes beyond its pictures' ends."""
+        video = self.new_folder() / "video.avi"
+        write_avi(video, [read_grey(file) for file in sorted((self.street / "image_0").iterdir())], is_bottom_up=True)
+        command = "rectify", "--left", video, "--right", shutil.copy(video, video.with_stem("right")), "--calib", self.street / "calib.txt", "--out"
+        if int(cv2.__version__.split(".")[0]) < 5:
+            out = self.new_folder() / "out"
+            self.assert_works(*command, out)
+            numpy.testing.assert_array_equal(cv2.imread(str(out / "image_2/000000.png"))[..., 0], read_grey(self.street / "image_0/000000.png"))
+        with unittest.mock.patch.object(cv2, "__version__", "5.0.0"):
+            self.assert_refused([*command, self.new_folder() / "never"], "video.avi: is an AVI of pixels that are not compressed, the last row first", "ffv1")
 
     def test_a_video_that_ends_before_the_other_one_is_told_of(self):
         folder = self.new_folder()

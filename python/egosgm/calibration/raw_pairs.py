@@ -6,6 +6,7 @@ import math
 import os
 import pathlib
 import re
+import struct
 import time
 from typing import Any, Dict, Iterator, List, Optional, Sequence, Tuple
 
@@ -103,9 +104,23 @@ class _Files(_Source):
         return (((_read_mpo if file.suffix.lower() == ".mpo" else _read_image)(file), None) for file in self._files)
 
 
+def _is_bottom_up(file: str) -> bool:
+    """Whether it is an AVI of pixels that are not compressed, the last row first."""
+    with open(file, "rb") as stream:
+        start = stream.read(4096)
+    at = start.find(b"strf") + 8  # a BITMAPINFOHEADER
+    if not start.startswith(b"RIFF") or at < 8 or len(start) < at + 20:
+        return False
+    height, compression = struct.unpack("<8xi4xI", start[at:at + 20])
+    return height > 0 and compression == 0
+
+
 class _Video(_Source):
     def __init__(self, file: str) -> None:
         _expect_file(file)
+        if int(cv2.__version__.split(".")[0]) >= 5 and _is_bottom_up(file):  # its FFmpeg writes beyond such a picture's end
+            raise _refuse(f"{file}: is an AVI of pixels that are not compressed, the last row first, on which OpenCV {cv2.__version__} would crash: "
+                          f"`ffmpeg -i {file} -c:v ffv1 {pathlib.Path(file).stem}.mkv` makes one that loses nothing, and opencv-python-headless<5 reads this one")
         self._file = file
         # By FFmpeg alone where OpenCV has it: other readers, which it would try next, print.
         has_ffmpeg = cv2.CAP_FFMPEG in cv2.videoio_registry.getStreamBackends()
