@@ -16,7 +16,9 @@ namespace {
 namespace fs = std::filesystem;
 using Contents = std::optional<std::string>;
 
-constexpr std::pair<const char*, const char*> kSides[] = {{"left", "right"}, {"Left", "Right"}, {"LEFT", "RIGHT"}};
+constexpr std::pair<const char*, const char*> kSides[] = {{"left", "right"}, {"Left", "Right"}, {"LEFT", "RIGHT"},
+                                                          {"_L", "_R"},      {"_l", "_r"},      {"infra1", "infra2"},
+                                                          {"lcam", "rcam"}};
 constexpr std::size_t kMostNamed = 5;
 constexpr std::size_t kMostFolders = 1000;  // a data set has no more beside each other; looking stays short
 
@@ -112,6 +114,56 @@ Contents sequences_below(const fs::path& folder) {
          found.front().string();
 }
 
+/// The name of an image with `*` in place of its last number.
+std::string without_number(const std::string& name) {
+  const std::size_t last = name.find_last_of("0123456789", name.find_last_of('.'));
+  if (last == std::string::npos) return name;
+  const std::size_t before = name.find_last_not_of("0123456789", last);
+  const std::size_t first = before == std::string::npos ? 0 : before + 1;
+  return std::string(name).replace(first, last - first + 1, "*");
+}
+
+/// The left and the right images of the pairs in a folder, by their names.
+std::vector<std::pair<std::string, std::string>> pairs_in(const fs::path& folder) {
+  std::vector<std::pair<std::string, std::string>> pairs;
+  for (const std::string& name : names_in(folder)) {
+    if (!is_image_name(name)) continue;
+    for (const auto& [left, right] : kSides) {
+      const std::size_t at = name.find(left);
+      if (at == std::string::npos) continue;
+      const std::string partner = std::string(name).replace(at, std::strlen(left), right);
+      if (is_file(folder / partner)) pairs.emplace_back(name, partner);
+    }
+  }
+  return pairs;
+}
+
+/// Images of both cameras in one folder.
+Contents both_cameras(const fs::path& folder) {
+  const std::vector<std::pair<std::string, std::string>> pairs = pairs_in(folder);
+  if (pairs.empty()) return std::nullopt;
+  return "it holds images of both cameras: give --left '" + (folder / without_number(pairs[0].first)).string() +
+         "' --right '" + (folder / without_number(pairs[0].second)).string() + "' --calib FILE";
+}
+
+/// Folders that may be the cameras', of names that do not say so.
+Contents folders_of_images(const fs::path& folder) {
+  std::vector<fs::path> found;
+  for (const fs::path& child : folders_in(folder)) {
+    std::vector<fs::path> places{child};
+    if (!holds_images(child)) places = folders_in(child);
+    for (const fs::path& place : places) {
+      if (holds_images(place)) found.push_back(place);
+    }
+  }
+  if (found.size() < 2) return std::nullopt;
+  const auto name_of = [&](const fs::path& place) { return place.lexically_relative(folder).string(); };
+  return "its folders " + name_of(found[0]) + " and " + name_of(found[1]) +
+         (found.size() > 2 ? " and " + std::to_string(found.size() - 2) + " more" : "") +
+         " hold images: where two of them are the left and the right camera's, give --left '" +
+         (found[0] / "*").string() + "' --right '" + (found[1] / "*").string() + "' --calib FILE, with their names";
+}
+
 /// The folder of one camera's images.
 Contents one_camera(const fs::path& folder) {
   std::error_code error;
@@ -121,7 +173,10 @@ Contents one_camera(const fs::path& folder) {
   }
   if (!holds_images(folder)) return std::nullopt;
   return "it holds images of its own: give --left '" + (folder / "LEFT_*").string() + "' --right '" +
-         (folder / "RIGHT_*").string() + "' --calib FILE, with the names that they have";
+         (folder / "RIGHT_*").string() +
+         "' --calib FILE, with the names that they have; where each shows both views side by side, `egosgm rectify "
+         "--side-by-side '" +
+         (folder / "*").string() + "'` parts them";
 }
 
 Contents two_cameras(const fs::path& folder) {
@@ -168,19 +223,8 @@ std::vector<std::pair<std::string, std::string>> names_of_cameras(const fs::path
 
 /// The left and the right image of a pair, by their names; nothing where there are none, or several.
 std::optional<std::pair<std::string, std::string>> pair_in(const fs::path& folder) {
-  std::optional<std::pair<std::string, std::string>> found;
-  for (const std::string& name : names_in(folder)) {
-    if (!is_image_name(name)) continue;
-    for (const auto& [left, right] : kSides) {
-      const std::size_t at = name.find(left);
-      if (at == std::string::npos) continue;
-      const std::string partner = std::string(name).replace(at, std::strlen(left), right);
-      if (!is_file(folder / partner)) continue;
-      if (found) return std::nullopt;
-      found.emplace(name, partner);
-    }
-  }
-  return found;
+  const std::vector<std::pair<std::string, std::string>> pairs = pairs_in(folder);
+  return pairs.size() == 1 ? std::optional(pairs.front()) : std::nullopt;
 }
 
 /// Pairs that have a folder each, or the pair that `folder` holds.
@@ -202,7 +246,8 @@ Contents result_of_a_run(const fs::path& folder) {
 }  // namespace
 
 Contents found_instead(const fs::path& folder) {
-  for (const auto& look : {multiview, sequences_below, euroc, videos, result_of_a_run, two_cameras, one_camera}) {
+  for (const auto& look : {multiview, sequences_below, euroc, videos, result_of_a_run, two_cameras, both_cameras,
+                           one_camera, folders_of_images}) {
     if (Contents found = look(folder)) return found;
   }
   return std::nullopt;

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "vision/foreign_file.h"
 
+#include <algorithm>
+#include <initializer_list>
+#include <string_view>
 #include <system_error>
 
 #include "egosgm/error.h"
@@ -51,6 +54,9 @@ std::string foreign_kind(std::string_view start) {
       {0, "GIF8", "it is a GIF: write its pictures as PNG"},
       {0, "\x93NUMPY", "it is an array of NumPy: in Python, egosgm.run takes pairs of images; or write them as PNG"},
       {8, "AVI ", kVideo},
+      {0, "\x30\x26\xb2\x75", kVideo},  // Windows Media
+      {0, "FLV\x01", kVideo},
+      {0, "\0\0\1\xba"sv, kVideo},  // MPEG
       {0, "\x1a\x45\xdf\xa3", kVideo},
       {0, "II*\0"sv, std::string("it is a TIFF") + kRectify},
       {0, "MM\0*"sv, std::string("it is a TIFF") + kRectify},
@@ -69,6 +75,9 @@ std::string foreign_kind(std::string_view start) {
       {0, "\x89MCAP", rosbag},
       {0, "#ROSBAG", rosbag},
       {0, "SQLite format 3", rosbag},
+      {0, "rosbag2_bagfile_information", "it is the description of a recording of ROS: give the folder that it is in"},
+      {0, "Pf\n", "it is a map of floats (PFM): `run` makes such maps, of images"},
+      {0, "\x76\x2f\x31\x01", "it is OpenEXR: write its images as PNG of 16 bits"},
       {0, "\x89HDF", "it is HDF5: write its images as PNG, a folder for each camera"},
       {0, "<", "it is a web page or XML: was its download refused?"},
   };
@@ -100,13 +109,28 @@ std::string foreign_input(const fs::path& path) {
   }
   if (is_own_calibration(path)) return "it is a calibration: give the folder of the sequence that it belongs to";
   const std::string extension = lower(path.extension().string());
-  if (extension == ".mpo") {
-    return "it holds both pictures of a 3D camera (MPO), which `egosgm rectify --side-by-side` reads, with the "
-           "camera's calibration";
-  }
-  if (extension == ".svo" || extension == ".svo2") {
-    return "it is a recording of a ZED: its SDK's ZED_SVO_Export makes a video of it, left and right, which `egosgm "
-           "rectify --side-by-side` reads";
+  struct Kind {
+    std::initializer_list<std::string_view> extensions;
+    const char* meaning;
+  };
+  static const Kind kKinds[] = {
+      {{".mpo"},
+       "it holds both pictures of a 3D camera (MPO), which `egosgm rectify --side-by-side` reads, with the camera's "
+       "calibration"},
+      {{".svo", ".svo2"},
+       "it is a recording of a ZED: its SDK's ZED_SVO_Export makes a video of it, left and right, which `egosgm "
+       "rectify --side-by-side` reads"},
+      {{".npz"}, "it holds arrays of NumPy: in Python, egosgm.run takes pairs of images; or write them as PNG"},
+      {{".h264", ".264", ".h265", ".265", ".hevc", ".mjpeg", ".mjpg", ".ts", ".mts", ".m2ts"},
+       "it is a stream of a video: `ffmpeg -i FILE -c copy FILE.mkv` makes a video of it that `egosgm run` reads"},
+      {{".csv", ".txt"},
+       "it is text: where its rows name pairs of images, `egosgm rectify --list` reads it, with the cameras' "
+       "calibration"},
+  };
+  for (const Kind& kind : kKinds) {
+    if (std::find(kind.extensions.begin(), kind.extensions.end(), extension) != kind.extensions.end()) {
+      return kind.meaning;
+    }
   }
   try {
     return foreign_kind(read_file_start(path, kKindBytes));

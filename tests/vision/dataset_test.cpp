@@ -428,6 +428,23 @@ TEST_F(DatasetTest, PairsMayHaveAFolderEach) {
   expect_refused([&] { open_folder(root_ / "c"); }, {"no stereo sequence"});
 }
 
+TEST_F(DatasetTest, ImagesOfBothCamerasAreNamedWhereverTheyAre) {
+  add_images({"a/left00", "a/left01", "a/right00", "a/right01", "b/000_L", "b/000_R", "b/001_L", "b/001_R"});
+  expect_refused([&] { open_folder(root_ / "a"); },
+                 {"holds images of both cameras", "a/left*.png' --right", "a/right*.png'"});
+  expect_refused([&] { open_folder(root_ / "b"); }, {"b/*_L.png' --right", "b/*_R.png'"});
+  add_images({"c/camera_0/1", "c/camera_1/1", "d/0/data/1", "d/1/data/1", "d/2/data/1"});
+  expect_refused([&] { open_folder(root_ / "c"); },
+                 {"its folders camera_0 and camera_1 hold images", "c/camera_0/*' --right"});
+  expect_refused([&] { open_folder(root_ / "d"); }, {"its folders 0/data and 1/data and 1 more hold images"});
+  add_images({"e/both"});
+  expect_refused([&] { open_folder(root_ / "e"); }, {"LEFT_*'", "rectify --side-by-side"});
+  add_images({"f/infra1/1", "f/infra2/1", "g/image_lcam_front/1", "g/image_rcam_front/1", "h/cam_L/1", "h/cam_R/1"});
+  EXPECT_EQ(open_folder(root_ / "f").frames[0].right, root_ / "f/infra2/1.png");
+  EXPECT_EQ(open_folder(root_ / "g").frames[0].right, root_ / "g/image_rcam_front/1.png");
+  EXPECT_EQ(open_folder(root_ / "h").frames[0].right, root_ / "h/cam_R/1.png");
+}
+
 TEST_F(DatasetTest, WhatARunWroteIsNoInput) {
   add_images({"out/left/0", "out/right/0"}), add_text("out/report.json", "{}"),
       add_text("out/calibration.txt", kOwnCalibration);
@@ -444,13 +461,22 @@ TEST_F(DatasetTest, WhatIsGivenInPlaceOfAFolderIsNamed) {
                                                        {"\x93NUMPY", "an array of NumPy"},
                                                        {kOwnCalibration, "is a calibration: give the folder"},
                                                        {"\x89MCAP0", "by --bag"},
-                                                       {"#ROSBAG V2.0", "by --bag"}};
+                                                       {"#ROSBAG V2.0", "by --bag"},
+                                                       {"FLV\x01rest", "is a video"},
+                                                       {"\x30\x26\xb2\x75rest", "is a video"},
+                                                       {"Pf\n2 2\n-1\n", "a map of floats"},
+                                                       {"rosbag2_bagfile_information:", "give the folder"}};
   for (const auto& [content, named] : kinds) {
     add_text("drive.dat", content);
     expect_refused([&] { open_folder(root_ / "drive.dat"); }, {"drive.dat: is no folder; it is", named});
   }
   add_text("DSCF0001.MPO", "\xff\xd8\xff");
   expect_refused([&] { open_folder(root_ / "DSCF0001.MPO"); }, {"both pictures of a 3D camera", "--side-by-side"});
+  for (const auto& [name, named] :
+       {std::pair{"pair.npz", "arrays of NumPy"}, {"left.h264", "-c copy FILE.mkv"}, {"pairs.csv", "rectify --list"}}) {
+    add_text(name, "PK\x03\x04");
+    expect_refused([&, file = root_ / name] { open_folder(file); }, {name, named});
+  }
   add_text("HD720.svo2", "x");
   expect_refused([&] { open_folder(root_ / "HD720.svo2"); }, {"recording of a ZED", "ZED_SVO_Export"});
   for (const char* camera : {"0", "/dev/video77", "rtsp://camera/left"}) {
