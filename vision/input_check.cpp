@@ -93,8 +93,15 @@ std::optional<Suspicion> suspect_calibration(const Calibration& c, Size size) {
       "was cropped from cx, cy";
   const std::string of_size = formatted("%dx%d", size.width, size.height);
   const double x = c.cx / size.width, y = c.cy / size.height;
+  const bool is_off = !is_within(x, kMaxOffBoth) && !is_within(y, kMaxOffBoth);
+  if (is_off && is_within(c.cx / size.height, kMaxOffBoth / 2) && is_within(c.cy / size.width, kMaxOffBoth / 2)) {
+    return Suspicion{formatted("the principal point (cx %.1f, cy %.1f) is that of images of %dx%d: these of ", c.cx,
+                               c.cy, size.height, size.width) +
+                         of_size + " are turned by 90 degrees",
+                     "turn them back: only as they were calibrated do the cameras stand side by side"};
+  }
   const bool is_far = !is_within(x, kMaxOffMiddle) || !is_within(y, kMaxOffMiddle);
-  const bool is_scaled = !is_within(x, kMaxOffBoth) && !is_within(y, kMaxOffBoth) && (x > 0.5) == (y > 0.5);
+  const bool is_scaled = is_off && (x > 0.5) == (y > 0.5);
   if (is_far || is_scaled) {
     return Suspicion{
         "the principal point is far from the middle of " + of_size + formatted(" (cx %.1f, cy %.1f)", c.cx, c.cy),

@@ -2,7 +2,9 @@
 #include "vision/mosaic.h"
 
 #include <algorithm>
+#include <bitset>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -14,6 +16,7 @@ constexpr double kLeastBrightness = 4;  // of a block, so that noise in the dark
 // Of the brightness, in the median of all blocks. Grey images of KITTI, Middlebury and others have 0.02 and less; their
 // mosaics 0.1 and more, also where one colour is only a tenth brighter than the others.
 constexpr double kLeastDifference = 0.04;
+constexpr std::size_t kFewestValues = 9;  // of an image; one that dithers fewer differs from pixel to pixel, too
 
 /// By how much the columns of a block differ, in its even or in its odd rows, as a share of its brightness. Its rows
 /// must differ as much: else it has stripes, as sensors make them.
@@ -32,6 +35,11 @@ double difference_in(const Image& grey, int top, int left) {
 }  // namespace
 
 bool holds_mosaic(const Image& grey) {
+  std::bitset<256> values;
+  for (int y = 0; y < grey.rows; ++y) {
+    for (int x = 0; x < grey.cols; ++x) values.set(grey.at<std::uint8_t>(y, x));
+  }
+  if (values.count() < kFewestValues) return false;
   std::vector<double> differences;
   for (int y = 0; y + kBlock <= grey.rows; y += kBlock) {
     for (int x = 0; x + kBlock <= grey.cols; x += kBlock) differences.push_back(difference_in(grey, y, x));

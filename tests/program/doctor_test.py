@@ -141,6 +141,22 @@ class Doctor(InputTest):
                 write_grey(street / f"image_{side}/{i:06d}.png", image)
         self.assertIn("interlaced", self.assert_only_problem("images", street)["text"])
 
+    def test_right_images_that_are_turned(self):
+        for name, turned in (("turned by 180 degrees", numpy.s_[::-1, ::-1]), ("upside down", numpy.s_[::-1, :])):
+            street = self.broken_street()
+            for file in (street / "image_1").iterdir():
+                write_grey(file, read_grey(file)[turned])
+            self.assertIn(f"the right images are {name}", self.assert_only_problem("matches", street)["text"])
+
+    def test_images_of_two_grey_levels_are_no_mosaics(self):
+        street = self.broken_street()
+        random = numpy.random.default_rng(1)
+        for file in (*(street / "image_0").iterdir(), *(street / "image_1").iterdir()):
+            grey = read_grey(file)
+            write_grey(file, numpy.where(grey + 64 * (numpy.indices(grey.shape).sum(0) % 2) + random.integers(0, 9, grey.shape) > 128, 255, 0))
+        self.assertIn("2 grey levels in all", self.assert_only_problem("images", street)["text"])
+        self.assertNotIn("mosaics", self.assert_works("run", street, "--out", self.new_folder() / "out"))
+
     def test_mosaics_of_colour_sensors(self):
         for order in (((0.45, 0.8), (0.8, 1.25)), ((0.95, 0.9), (1.0, 0.95)), ((0.8, 1.25), (0.45, 0.8))):
             for bits in (8, 16):

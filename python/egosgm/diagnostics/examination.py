@@ -25,6 +25,9 @@ _LEAST_CONTRAST = 16  # grey levels of 256 between which nearly all pixels lie
 _MOST_SATURATED = 0.25  # of the pixels
 _LEAST_COMB = 1.5  # how much more neighbouring rows differ than those two apart
 _FEWEST_COARSE = 0.03  # of the pixels of the coarse map; below, it says nothing
+_SURE_OF_TURN = 0.15  # of the pixels of the coarse map
+_FEWEST_LEVELS = 9  # grey levels of an image
+_TURNS = {"turned by 180 degrees": (-1, -1), "mirrored": (1, -1), "upside down, as in a mirror": (-1, 1)}  # steps of rows and columns that undo it
 
 
 class Finding(NamedTuple):
@@ -104,6 +107,7 @@ class Examination:
         self._width = self._height = self._bits = 0
         self._brightness = np.zeros(2)
         self._contrasts: List[float] = []
+        self._levels = 0
         self._saturated, self._interlaced, self._mosaics = np.zeros(2), 0, 0
         self._matches: List[NDArray[np.float32]] = []
         self._coarse: List[NDArray[np.float32]] = []
@@ -119,6 +123,7 @@ class Examination:
         self._equal += int(np.array_equal(left, right))
         greys = _egosgm._grey_bytes(left, right)
         self._contrasts.append(min(float(np.ptp(np.quantile(image, (0.01, 0.99)))) for image in greys))
+        self._levels = max(self._levels, *(np.count_nonzero(np.bincount(image.ravel())) for image in greys))
         self._mosaics += int(_egosgm._holds_mosaic(greys[0]))
         for side, image in enumerate((left, right)):
             self._brightness[side] += image.mean()
@@ -130,6 +135,7 @@ class Examination:
         self._matches.append(matches)
         row_offset = float(np.median(matches[:, 3] - matches[:, 1])) if len(matches) else 0.0
         coarse = _egosgm._coarse_map(left, right, row_offset, self._least, self._end)
+        self._last = left, right
         self._coarse_pixels += coarse.size
         self._coarse.append(coarse[np.isfinite(coarse)])
 
@@ -137,12 +143,16 @@ class Examination:
         """pairs: how many there are in all. REQUIRES: add() was called."""
         found = [self._images(pairs), self._of_calibration()]
         matches = np.concatenate(self._matches)
-        if not self._has_contrast():  # nothing else can be told
+        if not self._has_contrast() or self._levels < _FEWEST_LEVELS:  # nothing else can be told
             return found
         if self._equal == self._pairs:
             return [*found, Finding("problem", "matches", "the left and the right images are the same", "give the images of both cameras")]
         coarse = np.concatenate(self._coarse)
         is_sure = len(coarse) >= _FEWEST_COARSE * self._coarse_pixels
+        turn = None if is_sure else self._turn()
+        if turn:
+            return [*found, Finding("problem", "matches", f"the right images are {turn}: only so do they show what the left ones do", "turn them as the left ones are: a "
+                                    "camera that is mounted upside down turns its images by 180 degrees where its driver is told to; then calibrate them so")]
         are_related = len(matches) >= _FEWEST_SURE and len(coarse) >= _FEWEST_COARSE / 2 * self._coarse_pixels
         if len(matches) < FEWEST_MATCHES and not are_related:
             remedy = "give them sharper, brighter or with less noise: coarsely, left and right agree" if is_sure else \
@@ -159,6 +169,14 @@ class Examination:
         if behind <= 0.5:
             found.append(self._range(coarse, points))
         return found
+
+    def _turn(self) -> Optional[str]:
+        """How the right images are turned, where only then a coarse match finds much in the last pair."""
+        left, right = self._last
+        shares = {name: float(np.isfinite(_egosgm._coarse_map(left, np.ascontiguousarray(right[::rows, ::columns]), 0.0, self._least, self._end)).mean())
+                  for name, (rows, columns) in _TURNS.items()}
+        second, best = sorted(shares, key=lambda name: shares[name])[-2:]
+        return best if shares[best] >= max(_SURE_OF_TURN, 2 * shares[second]) else None
 
     def _has_contrast(self) -> bool:
         return float(np.median(self._contrasts)) >= _LEAST_CONTRAST
@@ -181,6 +199,9 @@ class Examination:
         if not self._has_contrast():
             return Finding("problem", "images", f"{text}, of nearly one tone: they hold {np.median(self._contrasts):.0f} of 256 grey levels",
                            "expose longer, or give more light: noise has as many")
+        if self._levels < _FEWEST_LEVELS:
+            return Finding("problem", "images", f"{text}, of {self._levels} grey levels in all: what tells one place from another is gone",
+                           "save them with 8 bits; pictures of 1 or 2 bits are not matched well")
         if 2 * self._mosaics > self._pairs:
             return Finding("problem", "images", f"{text}, the mosaics of colour sensors (Bayer): neighbouring pixels saw other colours",
                            "convert both images to grey first, as cv2.cvtColor(image, cv2.COLOR_BayerBG2GRAY) does for one order of the colours")
