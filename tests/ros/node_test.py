@@ -21,6 +21,7 @@ PACKAGE = pathlib.Path(__file__).resolve().parents[2] / "ros/egosgm_ros"
 HAS_TF = importlib.util.find_spec("tf2_ros") is not None
 TOPICS = ("camera_info", "disparity", "depth", "variance", "reason", "points2", "odom")
 STREET = dict(frames=RENDERED, width=WIDTH, height=HEIGHT, seed=1, speed_m=0.1, turn_deg=0, supersampling=1)
+STREET_WITH_A_BUS = dict(frames=3, width=480, height=180, seed=3, moving_object=True, supersampling=1)
 
 
 def publish(frames, rate, right_width=WIDTH, reliable=True, tf=False, tells=True, waits=False):
@@ -147,6 +148,27 @@ def subscribe(frames, seconds, reliable=True, tf=False):
     c = street.calibration
     told["expected_f_t"] = c.fx * c.baseline_m
     print(json.dumps(told))
+
+
+def vision_msgs_stand_in():
+    """vision_msgs.msg as far as the node uses it: the package index has it not."""
+    from geometry_msgs.msg import Pose, PoseWithCovariance, Vector3
+    from std_msgs.msg import Header
+
+    def message(**fields):
+        class Message:
+            __slots__ = tuple(fields)
+
+            def __init__(self, **values):
+                for name, kind in fields.items():
+                    setattr(self, name, values.pop(name) if name in values else kind())
+                assert not values, values
+        return Message
+
+    box, hypothesis = message(center=Pose, size=Vector3), message(class_id=str, score=float)
+    detection = message(header=Header, results=list, bbox=box, id=str)
+    return type("Vision", (), dict(ObjectHypothesisWithPose=message(hypothesis=hypothesis, pose=PoseWithCovariance), Detection3D=detection,
+                                   Detection3DArray=message(header=Header, detections=list)))
 
 
 class Node(unittest.TestCase):
@@ -333,8 +355,8 @@ class Parameters(unittest.TestCase):
         flat, ambiguous = (egosgm.REASONS.index(name) for name in ("flat", "ambiguous"))
         maps = type("Maps", (), dict(reason=np.array([[0, flat, ambiguous, 0]], np.uint8)))
         variance = np.array([[0.03, 0.05, 0.01, 0.01]], np.float32)  # a sigma of 0.2 m is the bound
-        np.testing.assert_array_equal(node._certain(depth, variance, maps), [[2, np.nan, np.nan, np.nan]])
-        np.testing.assert_array_equal(node._certain(depth, variance * 0.1, maps), [[2, 2, np.nan, np.nan]])
+        np.testing.assert_array_equal(node._certain(depth, variance, maps, None), [[2, np.nan, np.nan, np.nan]])
+        np.testing.assert_array_equal(node._certain(depth, variance * 0.1, maps, None), [[2, 2, np.nan, np.nan]])
         for encoding, colours in (("rgb8", [1, 2, 3]), ("bgra8", [3, 2, 1, 9])):
             image = Image(height=1, width=4, step=20, encoding=encoding, data=array.array("B", (colours * 4 + [7] * 20)[:20]))
             cloud = points_of(Header(), depth, np.full((1, 4), 5, np.uint8), rgb_of(image), egosgm.Calibration(100, 100, 2, 0, 0.1))
@@ -344,6 +366,89 @@ class Parameters(unittest.TestCase):
             self.assertEqual(set(points[:, 4].copy().view(np.uint32)), {0x010203})
             np.testing.assert_allclose(points[0, :4], [-0.04, 0, 2, 5], rtol=1e-6)
         self.assertIsNone(rgb_of(Image(encoding="mono8")))
+
+    def process_street_with_a_bus(self, topics, frames=3, **parameters):
+        """The node, and for each topic what it published of each frame: the real node's work, without the middleware."""
+        import egosgm
+        from sensor_msgs.msg import CameraInfo, Image
+        street = egosgm.SyntheticSequence(**STREET_WITH_A_BUS)
+        c = street.calibration
+        node = self.node(disparities=64, paths=4, **parameters)
+        node.trigger_configure()
+        for side, shift in (("left", 0), ("right", -c.fx * c.baseline_m)):
+            node._on_info(side, CameraInfo(height=180, width=480, k=[c.fx, 0, c.cx, 0, c.fy, c.cy, 0, 0, 1.0], p=[c.fx, 0, c.cx, shift, 0, c.fy, c.cy, 0, 0, 0, 1.0, 0]))
+        node._listened_to = lambda: set(topics)
+        sent = {topic: [] for topic in topics}
+        for topic in topics:
+            node._outputs[topic] = type("Publisher", (), dict(publish=sent[topic].append))
+        for i in range(frames):
+            images = []
+            for pixels in (street.render(i).left, street.render(i).right):
+                image = Image(height=180, width=480, step=480, encoding="mono8", data=array.array("B", pixels.tobytes()))
+                image.header.stamp.sec, image.header.frame_id = i + 1, "left_optical"
+                images.append(image)
+            node._process(*images)
+        return node, sent
+
+    @staticmethod
+    def expected_street_with_a_bus():
+        import egosgm
+        street = egosgm.SyntheticSequence(**STREET_WITH_A_BUS)
+        return list(egosgm.run([(frame.left, frame.right) for frame in map(street.render, range(3))], street.calibration, objects=True, disparities=64, paths=4))
+
+    def test_points_without_what_moves_by_itself(self):
+        """Of the real node: it leaves out what is marked or labelled, keeps all else, and tracks only where somebody listens to such points."""
+        import egosgm
+        points = []
+        for without in (False, True):
+            with mock.patch.object(egosgm, "ObjectTracker", wraps=egosgm.ObjectTracker) as tracker:
+                _, sent = self.process_street_with_a_bus(["points2"], points_without_moving=without)
+            self.assertEqual(tracker.call_count, without)
+            points.append([np.isfinite(np.frombuffer(cloud.data, np.float32).reshape(180, 480, -1)[..., 2]) for cloud in sent["points2"]])
+        for all_points, kept, expected in zip(*points, self.expected_street_with_a_bus()):
+            np.testing.assert_array_equal(kept, all_points & (expected.maps.dynamic == 0) & (expected.objects.labels == 0))
+        labels, marks = expected.objects.labels > 0, expected.maps.dynamic > 0
+        self.assertGreater((all_points & labels & ~marks).sum(), 50)  # neither alone would do
+        self.assertGreater((all_points & marks & ~labels).sum(), 50)
+
+    def test_what_moves_by_itself_is_detected_in_3d(self):
+        """With a stand-in of vision_msgs, whose classes have the fields of the real ones."""
+        import egosgm
+        from egosgm_ros import messages
+        with mock.patch.object(messages, "vision", vision_msgs_stand_in()):
+            with mock.patch("egosgm_ros.node.EgosgmNode.create_lifecycle_publisher", return_value=mock.Mock()) as create:
+                _, sent = self.process_street_with_a_bus(["objects"])
+            self.assertIn((messages.vision.Detection3DArray, "objects"), [call.args[:2] for call in create.call_args_list])
+        for message, expected in zip(sent["objects"], self.expected_street_with_a_bus()):
+            self.assertEqual(message.header.frame_id, "left_optical")
+            self.assertEqual([detection.id for detection in message.detections], [str(moving.id) for moving in expected.objects.moving])
+        c, depth = expected.calibration, egosgm.depth_from_disparity(expected.disparity, expected.calibration)
+        self.assertGreater(len(message.detections), 0)
+        for detection, moving in zip(message.detections, expected.objects.moving):
+            (found,) = detection.results
+            centre, box, size = found.pose.pose.position, detection.bbox.center.position, detection.bbox.size
+            self.assertEqual([detection.header.frame_id, found.hypothesis.class_id], ["left_optical", "moving"])
+            np.testing.assert_allclose([centre.x, centre.y, centre.z], moving.centre_m)
+            is_own = (expected.objects.labels == moving.id) & np.isfinite(depth)
+            rows, columns = np.nonzero(is_own)
+            for values, middle, length in (((columns - c.cx) / c.fx * depth[is_own], box.x, size.x), ((rows - c.cy) / c.fy * depth[is_own], box.y, size.y),
+                                           (depth[is_own], box.z, size.z)):
+                low, high = np.sort(values)[[int(0.05 * len(values)), int(0.95 * len(values))]]
+                np.testing.assert_allclose([middle - length / 2, middle + length / 2], [low, high], atol=0.02)
+            self.assertGreater(min(size.x, size.y), 0.5)
+
+    def test_objects_end_where_nobody_listens_for_a_frame(self):
+        """The tracker would take the motion from a frame that it has not seen."""
+        import egosgm
+        node, _ = self.process_street_with_a_bus(["points2"], frames=1, points_without_moving=True)
+        grey, flat = np.zeros((180, 480), np.uint8), np.full((180, 480), 8, np.float32)
+        maps = type("Maps", (), dict(disparity=flat, dynamic=grey))
+        with mock.patch.object(egosgm, "ObjectTracker") as tracker:
+            self.assertIsNone(node._track({"depth"}, grey, maps, "motion"))
+            for _ in range(2):
+                node._track({"points2"}, grey, maps, "motion")
+        self.assertEqual(tracker.call_count, 1)
+        self.assertEqual([call.args[3] for call in tracker.return_value.process.call_args_list], [None, "motion"])
 
     def test_what_is_nearer_than_the_range_is_told(self):
         import egosgm
@@ -426,6 +531,8 @@ class Parameters(unittest.TestCase):
 
     def test_maps_are_made_for_those_who_listen(self):
         for parameters, topics, maps in (({}, {"depth", "odom"}, ("disparity",)), ({}, {"points2"}, ("disparity", "variance")), ({}, {"reason"}, ("disparity", "reason")),
+                                         ({}, {"objects"}, ("disparity", "dynamic")), ({"points_without_moving": True}, {"points2"}, ("disparity", "variance", "dynamic")),
+                                         ({"points_without_moving": True}, {"depth"}, ("disparity",)),
                                          ({"point_reasons": "trusted"}, {"points2"}, ("disparity", "variance", "reason")), ({"point_reasons": "trusted"}, {"depth"}, ("disparity",))):
             node = self.node(**parameters)
             node.trigger_configure()
@@ -594,7 +701,7 @@ class Started(unittest.TestCase):
         return node
 
     def test_what_cannot_work_ends_it_with_one_line(self):
-        for parameter, words in (("disparity:=64", " or disparities?"), ("disparities:=64.0", "disparities"), ("preset:=papr", "papr"),
+        for parameter, words in (("disparity:=64", "no parameter named disparity: "), ("disparities:=64.0", "disparities"), ("preset:=papr", "papr"),
                                  ("device:=no such one", "no such one")):
             node = self.start(parameter)
             _, said = node.communicate(timeout=60)
@@ -604,6 +711,8 @@ class Started(unittest.TestCase):
 
     def test_it_tells_what_it_waits_for(self):
         node = self.start()
+        if not importlib.util.find_spec("vision_msgs"):
+            self.assertIn("no topic objects: it needs vision_msgs: apt install ros-", node.stderr.readline())
         self.assertIn("active: waits for /stereo/left/camera_info /stereo/left/image_rect /stereo/right/camera_info /stereo/right/image_rect (best effort)",
                       node.stderr.readline())
         self.assertIn("no pairs of images", node.stderr.readline())

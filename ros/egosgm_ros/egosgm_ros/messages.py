@@ -12,6 +12,13 @@ from stereo_msgs.msg import DisparityImage
 import egosgm
 from egosgm.bag.ros_images import BODY_FROM_OPTICAL, quaternion_of, ros_disparity, ros_range
 
+try:
+    import vision_msgs.msg as vision
+except ImportError:  # a ROS installation may have it, the package index has not
+    vision = None
+
+BOX_QUANTILES = 0.05, 0.95  # of an object's points along each axis: some lie on the background beside it
+
 
 def bytes_of(values: Any) -> array.array:
     """Copied once."""
@@ -41,9 +48,7 @@ def points_of(header: Any, depth: Any, grey: Any, rgb: Any, calibration: egosgm.
     height, width = depth.shape
     names = ("x", "y", "z", "intensity") if rgb is None else ("x", "y", "z", "intensity", "rgb")
     points = np.empty((height, width, len(names)), np.float32)
-    points[..., 0] = (np.arange(width, dtype=np.float32) - np.float32(calibration.cx)) / np.float32(calibration.fx) * depth
-    points[..., 1] = (np.arange(height, dtype=np.float32)[:, None] - np.float32(calibration.cy)) / np.float32(calibration.fy) * depth
-    points[..., 2] = depth
+    _put_points(points, depth, calibration)
     points[..., 3] = grey
     if rgb is not None:  # as PCL packs it: three bytes of a float
         points[..., 4] = (rgb.astype(np.uint32) @ np.array([1 << 16, 1 << 8, 1], np.uint32)).astype(np.uint32).view(np.float32)
@@ -51,6 +56,34 @@ def points_of(header: Any, depth: Any, grey: Any, rgb: Any, calibration: egosgm.
     step = 4 * len(names)
     return PointCloud2(header=header, height=height, width=width, fields=fields, is_bigendian=False, point_step=step, row_step=step * width,
                        data=bytes_of(points), is_dense=False)
+
+
+def _put_points(points: Any, depth: Any, calibration: egosgm.Calibration) -> None:
+    """x, y and z, in the axes of the images' frame, as the first values of each pixel."""
+    height, width = depth.shape
+    points[..., 0] = (np.arange(width, dtype=np.float32) - np.float32(calibration.cx)) / np.float32(calibration.fx) * depth
+    points[..., 1] = (np.arange(height, dtype=np.float32)[:, None] - np.float32(calibration.cy)) / np.float32(calibration.fy) * depth
+    points[..., 2] = depth
+
+
+def detections_of(header: Any, objects: egosgm.LabelledObjects, depth: Any, calibration: egosgm.Calibration) -> Any:
+    """A Detection3DArray of what moves by itself, in the axes of the images' frame: each with the centre of its visible surface and the box
+    of its points. The message has no place for a velocity."""
+    message = vision.Detection3DArray(header=header)
+    points = np.empty((*depth.shape, 3), np.float32)
+    _put_points(points, depth, calibration)
+    for moving in objects.moving:
+        own = points[(objects.labels == moving.id) & np.isfinite(depth)]
+        low, high = np.quantile(own, BOX_QUANTILES, axis=0) if own.size else (np.array(moving.centre_m),) * 2
+        detection = vision.Detection3D(header=header, id=str(moving.id))
+        found = vision.ObjectHypothesisWithPose()
+        found.hypothesis.class_id, found.hypothesis.score = "moving", 1.0
+        _put_place(moving.centre_m, found.pose.pose.position)
+        _put_place((low + high) / 2, detection.bbox.center.position)
+        _put_place(high - low, detection.bbox.size)
+        detection.results = [found]
+        message.detections.append(detection)
+    return message
 
 
 class Path:
@@ -107,8 +140,8 @@ def odometry_of(header: Any, frame_id: str, path: Path) -> Odometry:
     if path.motion is not None and path.interval_s > 0:
         moved, twist = path.motion.current_from_previous, message.twist.twist
         linear, angular = (-body @ change / path.interval_s for change in (moved[:3, 3], _rotation_vector(moved[:3, :3])))
-        twist.linear.x, twist.linear.y, twist.linear.z = (float(value) for value in linear)
-        twist.angular.x, twist.angular.y, twist.angular.z = (float(value) for value in angular)
+        _put_place(linear, twist.linear)
+        _put_place(angular, twist.angular)
         message.twist.covariance = _turned(path.motion.covariance / path.interval_s**2, body)
     return message
 
@@ -122,5 +155,9 @@ def transform_of(header: Any, frame_id: str, world_from_camera: Any) -> Transfor
 
 
 def _put(pose: Any, position: Any, orientation: Any) -> None:
-    position.x, position.y, position.z = (float(value) for value in pose[:3, 3])
+    _put_place(pose[:3, 3], position)
     orientation.x, orientation.y, orientation.z, orientation.w = (float(value) for value in quaternion_of(pose[:3, :3]))
+
+
+def _put_place(values: Any, place: Any) -> None:
+    place.x, place.y, place.z = (float(value) for value in values)

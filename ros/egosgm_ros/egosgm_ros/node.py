@@ -27,13 +27,15 @@ from stereo_msgs.msg import DisparityImage
 import egosgm
 from egosgm.bag import Pairing
 from egosgm.bag.ros_images import Cameras, are_raw, grey_of, is_named_rect, rgb_of, stamp_ns, variance_of_depth
-from egosgm_ros.messages import Path, disparity_of, image_of, odometry_of, points_of, transform_of
+from egosgm_ros import messages
+from egosgm_ros.messages import Path, detections_of, disparity_of, image_of, odometry_of, points_of, transform_of
 from egosgm_ros.tf_motion import TfMotion, tf2_ros
 
 SIDES = ("left", "right")
 OUTPUTS = {"disparity": DisparityImage, "depth": Image, "variance": Image, "reason": Image, "points2": PointCloud2, "camera_info": CameraInfo}
 OWN = {"device": "", "preset": "default", "max_skew_ms": 0.0, "reliable": False, "auto_start": True, "odom_frame": "odom",
-       "publish_tf": False, "motion_frame": "", "tf_wait_s": 0.1, "compressed": False, "max_depth_sigma": 0.1, "point_reasons": ""}
+       "publish_tf": False, "motion_frame": "", "tf_wait_s": 0.1, "compressed": False, "max_depth_sigma": 0.1, "point_reasons": "",
+       "points_without_moving": False}
 PROFILES = pathlib.Path(__file__).with_name("fastdds.xml")
 PROFILES_NAMES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")  # before Fast DDS 3, and since then
 PROFILES_NAME = PROFILES_NAMES[os.environ.get("ROS_DISTRO") not in ("humble", "iron", "jazzy")]
@@ -81,6 +83,7 @@ class EgosgmNode(LifecycleNode):
         self._cameras: Optional[Cameras] = None
         self._pipeline: Optional[egosgm.Pipeline] = None
         self._odometry: Optional[egosgm.StereoOdometry] = None
+        self._tracker: Optional[egosgm.ObjectTracker] = None
         self._made_for: Tuple[CameraInfo, ...] = ()
         self._path = Path()
         self._newest: Optional[Tuple[Any, Any]] = None  # the pair that is matched next
@@ -151,6 +154,11 @@ class EgosgmNode(LifecycleNode):
         qos = QoSProfile(depth=QUEUE_SIZE, reliability=ReliabilityPolicy.RELIABLE) if self._value("reliable") else qos_profile_sensor_data
         self._outputs = {name: self.create_lifecycle_publisher(kind, name, qos) for name, kind in OUTPUTS.items()}
         self._outputs["odom"] = self.create_lifecycle_publisher(Odometry, "odom", QUEUE_SIZE)
+        if messages.vision:
+            self._outputs["objects"] = self.create_lifecycle_publisher(messages.vision.Detection3DArray, "objects", qos)
+        else:
+            self.get_logger().info("no topic objects: it needs vision_msgs: apt install ros-$ROS_DISTRO-vision-msgs")
+        self._tracked_topics = {"objects"} | ({"points2"} if self._value("points_without_moving") else set())
         self._inputs = []
         for index, side in enumerate(SIDES):
             self._inputs.append(self.create_subscription(CameraInfo, f"{side}/camera_info", lambda info, side=side: self._on_info(side, info), qos))
@@ -246,6 +254,7 @@ class EgosgmNode(LifecycleNode):
                 for tool in (self._pipeline, self._odometry):
                     if tool:
                         tool.reset()  # one of them may have gone on without the other
+                self._tracker = None
                 if str(error) != self._problem:
                     self.get_logger().error(str(error))
                 self._problem = str(error)
@@ -259,7 +268,7 @@ class EgosgmNode(LifecycleNode):
             self._pipeline = egosgm.Pipeline(cameras.calibration, *cameras.size, device=self._value("device"), **self._options())
             self._odometry = egosgm.StereoOdometry(cameras.calibration)
             self._cameras, self._made_for = cameras, infos  # last: where one cannot be made, all are made for the next pair
-            self._last_stamp = self._path.motion = None
+            self._last_stamp = self._path.motion = self._tracker = None
             raw = [topic.topic_name for info, topic in zip(infos, self._inputs[1::2]) if are_raw(info, topic.topic_name)]
             if raw and not self._topics_warning:
                 self._topics_warning = (f"by {' and '.join(raw)}'s name and camera info, which has a distortion or a rotation, it is not rectified: remap both "
@@ -285,7 +294,7 @@ class EgosgmNode(LifecycleNode):
             self._path.add(motion, (stamp - previous) / 1e9)
         wanted = self._listened_to()
         maps = self._pipeline.process(*images, motion, self._maps_for(wanted))
-        self._publish(wanted, left, images[0], maps)
+        self._publish(wanted, left, images[0], maps, self._track(wanted, images[0], maps, motion))
         self._report, self._count = maps.report, self._count + 1
         self._latency_ms = self.get_clock().now().nanoseconds / 1e6 - stamp / 1e6
         if self._count % PAIRS_PER_LOOK == 1:
@@ -295,8 +304,18 @@ class EgosgmNode(LifecycleNode):
             self.get_logger().info(f"first pair: {width}x{height} px, matched by {self._pipeline.device.name}")
 
     def _maps_for(self, wanted: Set[str]) -> Tuple[str, ...]:
-        needed = {"variance": {"variance", "points2"}, "reason": {"reason"} | ({"points2"} if self._point_reasons else set())}
+        needed = {"variance": {"variance", "points2"}, "reason": {"reason"} | ({"points2"} if self._point_reasons else set()),
+                  "dynamic": self._tracked_topics}
         return ("disparity", *(name for name, topics in needed.items() if wanted & topics))
+
+    def _track(self, wanted: Set[str], grey: Any, maps: egosgm.Frame, motion: Optional[egosgm.Motion]) -> Optional[egosgm.LabelledObjects]:
+        """What moves by itself, where a topic needs it. A frame that none needs ends all objects."""
+        if not wanted & self._tracked_topics:
+            self._tracker = None
+            return None
+        if self._tracker is None:
+            self._tracker, motion = egosgm.ObjectTracker(self._cameras.calibration), None
+        return self._tracker.process(grey, maps.disparity, maps.dynamic, motion)
 
     def _look_at_input(self, images: Any, report: egosgm.FrameReport) -> None:
         """What is nearer than the range, and what else speaks against the images or their calibration."""
@@ -317,32 +336,36 @@ class EgosgmNode(LifecycleNode):
             self._warning = f"{error}; such frames are searched whole"
             return None
 
-    def _certain(self, depth: Any, variance: Any, maps: egosgm.Frame) -> Any:
+    def _certain(self, depth: Any, variance: Any, maps: egosgm.Frame, objects: Optional[egosgm.LabelledObjects]) -> Any:
         """The depth of which points are made, NaN elsewhere."""
         is_certain = variance <= (self._value("max_depth_sigma") * depth) ** 2
         if self._point_reasons:
             is_certain &= np.isin(maps.reason, self._point_reasons)
+        if self._value("points_without_moving"):
+            is_certain &= (maps.dynamic == 0) & (objects.labels == 0)
         return np.where(is_certain, depth, np.float32(np.nan))
 
     def _listened_to(self) -> Set[str]:
         return {name for name, publisher in self._outputs.items() if publisher.get_subscription_count() > 0}
 
-    def _publish(self, wanted: Set[str], left: Any, grey: Any, maps: egosgm.Frame) -> None:
+    def _publish(self, wanted: Set[str], left: Any, grey: Any, maps: egosgm.Frame, objects: Optional[egosgm.LabelledObjects]) -> None:
         calibration, header = self._cameras.calibration, left.header
         if "disparity" in wanted:
             self._outputs["disparity"].publish(disparity_of(header, maps.disparity, calibration, self._pipeline.options))
         if "reason" in wanted:
             self._outputs["reason"].publish(image_of(header, maps.reason))
-        if wanted & {"depth", "variance", "points2"}:
+        if wanted & {"depth", "variance", "points2", "objects"}:
             depth = egosgm.depth_from_disparity(maps.disparity, calibration)
             if "depth" in wanted:
                 self._outputs["depth"].publish(image_of(header, depth))
+            if "objects" in wanted:
+                self._outputs["objects"].publish(detections_of(header, objects, depth, calibration))
         if wanted & {"variance", "points2"}:
             variance = variance_of_depth(maps.disparity, maps.variance, calibration)
             if "variance" in wanted:
                 self._outputs["variance"].publish(image_of(header, variance))
             if "points2" in wanted:
-                self._outputs["points2"].publish(points_of(header, self._certain(depth, variance, maps), grey, rgb_of(left), calibration))
+                self._outputs["points2"].publish(points_of(header, self._certain(depth, variance, maps, objects), grey, rgb_of(left), calibration))
         if "camera_info" in wanted:
             info = copy.copy(self._infos["left"])
             info.header = header
