@@ -744,14 +744,12 @@ class Files(unittest.TestCase):
             self.assertEqual(best_effort, reliability == ReliabilityPolicy.BEST_EFFORT, topic)
         self.assertEqual(shown["Global Options"]["Fixed Frame"], OWN["odom_frame"])
 
-    @unittest.skipUnless(importlib.util.find_spec("launch_ros"), "no launch_ros")
-    def test_the_launch_file_gives_the_node_its_parameters_by_their_types(self):
-        """By launch itself, which is told where the package is; the node's process is not started."""
+    def launched(self, **given):
+        """By launch itself, which is told where the package is: its context, the node and the viewer. No process is started."""
         import tempfile
 
         import launch
         import launch_ros.actions
-        from rclpy.parameter import Parameter
         with tempfile.TemporaryDirectory() as prefix:
             share = pathlib.Path(prefix) / "share"
             (share / "ament_index/resource_index/packages").mkdir(parents=True)
@@ -761,12 +759,17 @@ class Files(unittest.TestCase):
             source = launch.launch_description_sources.PythonLaunchDescriptionSource(str(PACKAGE / "launch/egosgm.launch.py"))
             context = launch.LaunchContext()
             description = source.get_launch_description(context)
-        given = dict(device="0", max_skew_ms="3", reliable="true", motion_frame="odom", namespace="/stereo")
         context.launch_configurations.update(given)
         for entity in description.entities:
             if isinstance(entity, launch.actions.DeclareLaunchArgument):
                 entity.execute(context)
-        node, viewer = (entity for entity in description.entities if isinstance(entity, launch_ros.actions.Node))
+        return context, *(entity for entity in description.entities if isinstance(entity, launch_ros.actions.Node))
+
+    @unittest.skipUnless(importlib.util.find_spec("launch_ros"), "no launch_ros")
+    def test_the_launch_file_gives_the_node_its_parameters_by_their_types(self):
+        import launch_ros.utilities
+        from rclpy.parameter import Parameter
+        context, node, viewer = self.launched(device="0", max_skew_ms="3", reliable="true", motion_frame="odom", namespace="/stereo")
         self.assertFalse(viewer.condition.evaluate(context))
         parameters = launch_ros.utilities.evaluate_parameters(context, node._Node__parameters)[0]
         self.assertEqual(parameters, dict(device="0", preset="default", max_skew_ms=3.0, reliable=True, motion_frame="odom", publish_tf=False))
@@ -774,6 +777,24 @@ class Files(unittest.TestCase):
         from egosgm_ros.node import OWN
         for name, value in parameters.items():
             self.assertEqual(Parameter(name, value=value).type_, Parameter(name, value=OWN[name]).type_, name)
+
+    @unittest.skipUnless(importlib.util.find_spec("launch_ros"), "no launch_ros")
+    def test_the_launch_file_takes_the_topics_of_a_cameras_driver(self):
+        """They are those that docs/use/robots.md names, and rectified by their names."""
+        from egosgm.bag.ros_images import is_named_rect
+        from launch.utilities import perform_substitutions
+        page = (PACKAGE.parents[1] / "docs/use/robots.md").read_text()
+        for camera, left in (("", "left/image_rect"), ("oak", "/oak/left/image_rect"), ("realsense", "/camera/camera/infra1/image_rect_raw"),
+                             ("zed", "/zed/zed_node/left/gray/rect/image")):
+            context, node, _ = self.launched(camera=camera)
+            remapped = {perform_substitutions(context, name): perform_substitutions(context, topic) for name, topic in node._Node__remappings}
+            right = left.replace("left", "right").replace("infra1", "infra2")
+            self.assertEqual(remapped, {"left/image_rect": left, "left/camera_info": str(pathlib.PurePosixPath(left).with_name("camera_info")),
+                                        "right/image_rect": right, "right/camera_info": str(pathlib.PurePosixPath(right).with_name("camera_info"))})
+            self.assertTrue(is_named_rect(left))
+            self.assertIn(f"`{left}`", page)
+        with self.assertRaisesRegex(RuntimeError, "camera"):
+            self.launched(camera="kinect")
 
 
 if __name__ == "__main__":
