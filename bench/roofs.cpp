@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "host/ocl/buffer.h"
+#include "host/ocl/kernel.h"
 
 namespace egosgm::bench {
 namespace {
@@ -70,10 +71,8 @@ double least_s(F&& f) {
 
 std::size_t units_of(const ocl::Context& context) { return context.device().getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>(); }
 
-bool is_gpu(const ocl::Context& context) { return context.device().getInfo<CL_DEVICE_TYPE>() == CL_DEVICE_TYPE_GPU; }
-
 /// Work-items that keep every unit busy: a GPU's hides what an item waits for behind the others of its unit.
-std::size_t items_of(const ocl::Context& context) { return is_gpu(context) ? 2048 * units_of(context) : 4096; }
+std::size_t items_of(const ocl::Context& context) { return ocl::is_gpu(context) ? 2048 * units_of(context) : 4096; }
 
 class Kernels {
  public:
@@ -102,7 +101,7 @@ class Kernels {
     kernel.setArg(0, cl_int{kTurns});
     kernel.setArg(1, values_.get());
     if (local_bytes > 0) kernel.setArg(2, local_bytes, nullptr);
-    return least_s([&] { return run(kernel, items, is_gpu(context_) ? kGroup : group); });
+    return least_s([&] { return run(kernel, items, ocl::is_gpu(context_) ? kGroup : group); });
   }
   double launch_us() {
     cl::Kernel nothing(program_, "nothing");
@@ -155,7 +154,7 @@ Roofs roofs_of(ocl::Context& context) {
               .popcount_g_s = kernels.values_g_s("count_bits", 1),
               .launch_us = kernels.launch_us(),
               .enqueue_us = kernels.enqueue_us()};
-  if (!is_gpu(context)) return roofs;
+  if (!ocl::is_gpu(context)) return roofs;
   const double turns = kTurns * static_cast<double>(kernels.items());
   roofs.local_gb_s = 2 * sizeof(cl_uint) * turns * 1e-9 /
                      kernels.turns_s("rotate_local", kGroup, kernels.items(), kGroup * sizeof(cl_uint));

@@ -17,10 +17,13 @@ struct Range {
   cl::NDRange local;
 };
 
+/// Whether work-items are lanes, of which many share what they wait for.
+inline bool is_gpu(const Context& context) { return context.device().getInfo<CL_DEVICE_TYPE>() == CL_DEVICE_TYPE_GPU; }
+
 /// A work-item a pixel and view: global ids are x, y, view. x is rounded up, so kernels guard their bounds. Groups are
 /// of 128 on GPUs, some of which hold 16 groups at once and 48 warps of 32.
 inline Range every_pixel(const Context& context, shared::ImageSize size, int views = 2) {
-  std::size_t local = context.device().getInfo<CL_DEVICE_TYPE>() == CL_DEVICE_TYPE_GPU ? 128 : 64;
+  std::size_t local = is_gpu(context) ? 128 : 64;
   while (local > context.max_work_group_size()) local /= 2;
   return {cl::NDRange((size.width + local - 1) / local * local, size.height, views), cl::NDRange(local, 1, 1)};
 }
@@ -35,8 +38,7 @@ inline Range every_pixels(const Context& context, shared::ImageSize size, int pi
 /// A work-item a row and view: global ids are y, view. A CPU's work-groups hold one: it deals out groups, and rows are
 /// long.
 inline Range every_row(const Context& context, shared::ImageSize size, int views = 2) {
-  const bool is_gpu = context.device().getInfo<CL_DEVICE_TYPE>() == CL_DEVICE_TYPE_GPU;
-  return {cl::NDRange(size.height, views), is_gpu ? cl::NullRange : cl::NDRange(1, 1)};
+  return {cl::NDRange(size.height, views), is_gpu(context) ? cl::NullRange : cl::NDRange(1, 1)};
 }
 
 /// A work-group of `work_items` a row and view: local id 0 is the lane, global ids 1 and 2 are y and view.
@@ -47,14 +49,11 @@ inline Range group_a_row(shared::ImageSize size, int work_items, int views = 2) 
 /// The number of work-items that share a row whose values build on one another: many where a work-item is slow, else
 /// one.
 inline int row_group(const Context& context) {
-  const bool is_gpu = context.device().getInfo<CL_DEVICE_TYPE>() == CL_DEVICE_TYPE_GPU;
-  return is_gpu ? static_cast<int>(std::min<std::size_t>(128, context.max_work_group_size())) : 1;
+  return is_gpu(context) ? static_cast<int>(std::min<std::size_t>(128, context.max_work_group_size())) : 1;
 }
 
 /// PIXELS of kernels/pixels.h: one where work-items are lanes, else a vector.
-inline int pixels_a_work_item(const Context& context) {
-  return context.device().getInfo<CL_DEVICE_TYPE>() == CL_DEVICE_TYPE_GPU ? 1 : 16;
-}
+inline int pixels_a_work_item(const Context& context) { return is_gpu(context) ? 1 : 16; }
 
 /// Whether a device of this version is the CPU that this program runs on, by PoCL. Its remote driver gives devices of
 /// other machines with the same platform, type and name, but "pocl-remote" in place of what it compiles for.

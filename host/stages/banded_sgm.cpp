@@ -240,7 +240,7 @@ void BandedSgm::sweep(const shared::SgmParameters& parameters, const MatchInputs
 
 bool BandedSgm::follows_paths(const ocl::Context& context, Scheduling scheduling) {
   if (scheduling != Scheduling::kAutomatic) return scheduling == Scheduling::kPaths;
-  return context.device().getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_GPU;
+  return ocl::is_gpu(context);
 }
 
 int BandedSgm::matched_rows() const {

@@ -19,9 +19,7 @@ constexpr int kLocalBytes = 16 << 10, kCostBytes = 2 * 2;
 
 int groups_of(int lines, int lines_a_group) { return (lines + lines_a_group - 1) / lines_a_group; }
 
-bool is_gpu(const ocl::Context& context) { return context.device().getInfo<CL_DEVICE_TYPE>() == CL_DEVICE_TYPE_GPU; }
-
-int vector_of(const ocl::Context& context) { return is_gpu(context) ? kQuad : kVector; }
+int vector_of(const ocl::Context& context) { return ocl::is_gpu(context) ? kQuad : kVector; }
 
 /// A pixel's vectors hold so many cells more than its band, which may begin and end within one.
 int spare_cells(int vector) { return vector == kQuad ? kQuad : vector + EGOSGM_LANES; }
@@ -43,7 +41,7 @@ ocl::Defines defines(const ocl::Context& context, shared::DisparityRange range, 
 }  // namespace
 
 BandedSgmPaths::Group BandedSgmPaths::default_group(const ocl::Context& context, shared::DisparityRange range) {
-  if (!is_gpu(context)) return {1, 1};
+  if (!ocl::is_gpu(context)) return {1, 1};
   const int limit = static_cast<int>(std::min<std::size_t>(context.max_work_group_size(), kGroupSize));
   const int quads = SearchBand::max_chunks(range) * EGOSGM_LANES / kQuad;
   int lanes = 1;
