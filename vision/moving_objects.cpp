@@ -38,6 +38,13 @@ constexpr double kSharedErrors = 16;                    // points whose disparit
 constexpr float kMaxGreyCost = 10, kMaxDisparityCost = 3, kUnknownCost = 1, kHiddenCost = 1.3f;
 constexpr float kMinGain = 0.33f;  // of a labelled pixel and those around, against the camera's motion
 
+bool has_equal_pixels(const Image& a, const Image& b) {
+  for (int y = 0; y < a.rows; ++y) {
+    if (!std::equal(a.row<float>(y), a.row<float>(y) + a.cols, b.row<float>(y))) return false;
+  }
+  return true;
+}
+
 // A median over a few of a group's pixels: `value` gives none where a pixel says nothing.
 template <typename Value>
 double median_over(const Group& group, const Value& value) {
@@ -89,7 +96,7 @@ struct ObjectTracker::State {
   explicit State(const Calibration& of_images) : calibration(of_images) {}
 
   void take(AlignedView view, const std::optional<Motion>& given, const Image& dynamic);
-  LabelledObjects newest() const { return {moving, labels.clone()}; }
+  LabelledObjects newest() const { return {moving, moving.empty() ? Image(size, kU8, 0) : labels.clone()}; }
   SceneFlow scene_flow() const;
 
   const Calibration calibration;
@@ -128,6 +135,7 @@ struct ObjectTracker::State {
 
   AlignedView last{}, now{};
   bool has_view = false;
+  Eigen::Isometry3d since_repeated = Eigen::Isometry3d::Identity();  // the motions that came with the last view again
   Image last_labels{}, labels{};
   std::vector<Track> tracks{};
   Eigen::Isometry3d camera_back = Eigen::Isometry3d::Identity();
@@ -503,10 +511,19 @@ void ObjectTracker::State::describe(MovingObject& object, const Group& group, co
 
 void ObjectTracker::State::take(AlignedView view, const std::optional<Motion>& given, const Image& dynamic) {
   size = view.disparity.size();
+  const bool repeats = given && has_view && has_equal_pixels(view.greys[0], now.greys[0]);
   last = std::exchange(now, std::move(view));
-  last_labels = std::exchange(labels, Image(size, kU8, 0));
   motion = std::exchange(has_view, true) ? given : std::nullopt;
   moving.clear();
+  if (repeats) {  // the same moment: all stands, and objects go on with the next view
+    since_repeated = given->current_from_previous * since_repeated;
+    motion = Motion();
+    last_labels = labels;
+    return;
+  }
+  last_labels = std::exchange(labels, Image(size, kU8, 0));
+  if (motion) motion->current_from_previous = motion->current_from_previous * since_repeated;
+  since_repeated.setIdentity();
   if (motion) {
     find_objects(dynamic);
   } else {

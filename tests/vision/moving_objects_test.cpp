@@ -213,6 +213,41 @@ TEST(MovingObjects, ImagesOf16BitsAndMapsWithoutValues) {
   EXPECT_TRUE(is_empty(black));
 }
 
+/// Each picture comes twice, as from a camera of half the rate; its poses go on, or stand.
+TEST(MovingObjects, PicturesThatRepeatAreOneMoment) {
+  ObjectTracker once(street().calibration()), twice(street().calibration()), with_poses(street().calibration());
+  for (int k = kFirst; k < kFirst + kFrames; ++k) {
+    const SyntheticFrame images = street().render(k);
+    const auto next = [&](ObjectTracker& tracker, const Motion& motion) {
+      return tracker.process(images.left, images.left_disparity, images.left_moving, motion);
+    };
+    Motion half = street().motion(k);
+    half.current_from_previous.translation() *= 0.5;
+    Motion rest = half;
+    rest.current_from_previous = street().motion(k).current_from_previous * half.current_from_previous.inverse();
+    const LabelledObjects expected = next(once, street().motion(k));
+    const LabelledObjects found = next(twice, street().motion(k));
+    const LabelledObjects with_half = next(with_poses, k == kFirst ? half : rest);
+    ASSERT_EQ(found.moving.size(), expected.moving.size()) << k;
+    ASSERT_EQ(with_half.moving.size(), expected.moving.size()) << k;
+    for (std::size_t i = 0; i < expected.moving.size(); ++i) {
+      EXPECT_EQ(found.moving[i].id, expected.moving[i].id) << k;
+      EXPECT_EQ(found.moving[i].age, expected.moving[i].age) << k;
+      EXPECT_EQ(found.moving[i].velocity_m, expected.moving[i].velocity_m) << k;
+      EXPECT_EQ(with_half.moving[i].age, expected.moving[i].age) << k;
+      EXPECT_LT((with_half.moving[i].velocity_m - expected.moving[i].velocity_m).norm(), 1e-6) << k;
+    }
+    const LabelledObjects again = next(twice, Motion());
+    EXPECT_TRUE(again.moving.empty() && is_empty(again.labels)) << k;
+    const std::optional<SceneFlow> flow = twice.scene_flow();
+    ASSERT_TRUE(flow);
+    EXPECT_NEAR(flow->flow.at<float>(90, 2 * 240), 0, 1e-3);
+    Motion to_next = street().motion(k + 1);
+    to_next.current_from_previous.translation() *= 0.5;
+    next(with_poses, to_next);
+  }
+}
+
 /// Marks with gaps make several candidates of one vehicle, which share pixels.
 TEST(MovingObjects, PixelsThatCandidatesShareCountOnce) {
   ObjectTracker tracker(street().calibration());

@@ -63,8 +63,9 @@ class EGOSGM_EXPORT ObjectTracker {
   ObjectTracker& operator=(ObjectTracker&&) noexcept;
 
   /// The next frame: its left image (kU8 or kU16), the pipeline's `disparity` (kF32) and `dynamic` (kU8) of it, and the
-  /// camera's motion from the frame before. Without a motion all objects end. Throws InvalidArgument where sizes or
-  /// types differ, or the motion is none; the state is then as before the call.
+  /// camera's motion from the frame before. Without a motion all objects end. In a left image that
+  /// equals the last one nothing moves; the motion that came with it counts for the next one, in which objects go on.
+  /// Throws InvalidArgument where sizes or types differ, or the motion is none; the state is then as before the call.
   LabelledObjects process(const Image& left, const Image& disparity, const Image& dynamic,
                           const std::optional<Motion>& motion);
 
