@@ -158,10 +158,13 @@ class Report(ReportTest):
         self.assertLess(page.stat().st_size, self.page.stat().st_size / 2)
 
     def test_the_page_is_the_same_in_a_locale_of_other_letters(self):
-        page = self.new_folder() / "page.html"
-        self.assert_works("report", self.out, "--truth", self.street / "truth/left_disp_noc", "--poses", self.street / "poses.txt", "--out", page,
-                          env=dict(os.environ, LC_ALL="C", PYTHONUTF8="0", PYTHONCOERCECLOCALE="0"))
-        self.assertEqual(page.read_bytes(), self.page.read_bytes())
+        pages = []
+        for changes in ({}, dict(LC_ALL="C", PYTHONUTF8="0", PYTHONCOERCECLOCALE="0")):  # both by one Python: others pack pictures in other ways
+            page = self.new_folder() / "page.html"
+            self.assert_works("report", self.out, "--truth", self.street / "truth/left_disp_noc", "--poses", self.street / "poses.txt", "--out", page,
+                              env={**os.environ, **changes})
+            pages.append(page.read_bytes())
+        self.assertEqual(*pages)
 
     def test_truth_in_the_folders_that_eval_takes(self):
         kitti, out = self.new_folder() / "training", self.new_folder() / "out"
