@@ -34,8 +34,8 @@ struct Package {
                                                      vision::FrameRange range, const std::string& out)>
       open_videos;
   CalibrationReader read_calibration;
-  /// A recording, unless `file` is empty, and a viewer.
-  std::function<std::shared_ptr<FrameSink>(const std::string& file, bool viewer)> take;
+  /// A recording, unless `file` is empty, a viewer, and a page in the browser.
+  std::function<std::shared_ptr<FrameSink>(const std::string& file, bool viewer, bool page)> take;
 };
 
 Command add_run(CLI::App& program, const Package& package);

@@ -8,7 +8,7 @@
 
 namespace egosgm::app {
 
-/// The maps of a frame as they come from the device: kF32, and kU8 of reasons.
+/// The maps of a frame as they come from the device: kF32, and kU8 of reasons. Empty where the run does not make it.
 struct ShownMaps {
   vision::Image disparity, variance, reason;
 };

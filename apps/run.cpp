@@ -19,7 +19,7 @@ namespace {
 /// The device of --fallback. Throws InvalidArgument where what the run makes cannot be made twice.
 std::optional<Device> fallback_of(const RunArguments& arguments) {
   if (arguments.fallback.empty()) return std::nullopt;
-  if (!arguments.has_folder() || arguments.rerun) {
+  if (!arguments.has_folder() || arguments.rerun || arguments.show) {
     throw InvalidArgument(
         "--fallback: frames are matched again, which a viewer or a recording would show twice: give a folder as --out");
   }

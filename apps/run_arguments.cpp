@@ -62,9 +62,14 @@ void expect_takeable(const RunArguments& arguments, const SequenceJob& job) {
   if (job.kinds.contains("overview")) {
     for (const vision::StereoFrame& frame : sequence.frames) vision::expect_truth_of_size(frame, job.source->size());
   }
-  if (!arguments.has_recording() && !arguments.rerun) return;
-  const std::string what = arguments.has_recording() ? "--out " + arguments.out : "--rerun";
-  if (!sequence.has_calibration) throw InvalidArgument(what + ": shows depth, which needs a calibration: give --calib");
+  if (!arguments.has_sink()) return;
+  const std::string what = arguments.has_recording() ? "--out " + arguments.out
+                           : arguments.rerun         ? "--rerun"
+                                                     : "--show";
+  const bool shows_depth = arguments.has_recording() || arguments.rerun;
+  if (shows_depth && !sequence.has_calibration) {
+    throw InvalidArgument(what + ": shows depth, which needs a calibration: give --calib");
+  }
   if (arguments.has_recording() && !arguments.out.ends_with(".rrd") && arguments.bag.bag.empty()) {
     throw InvalidArgument(what + ": its messages have the stamps of a bag: give a folder, or FILE.rrd");
   }
@@ -101,6 +106,9 @@ void RunArguments::add_to(CLI::App& command) {
                   "go on with a run that was stopped: its maps stay, the result is that of an undisturbed run. Frames "
                   "before are computed again, for the filter's state");
   output.add_flag("--rerun", rerun, "show each frame in the viewer Rerun, by the Python package");
+  output.add_flag(
+      "--show", show,
+      "show the left image and the disparity of each frame on a page in the browser, by the Python package");
   output.add_flag("--quiet", quiet, "no progress, only errors");
   bag.add_to(command);
   method.add_to(command);
@@ -120,7 +128,7 @@ SequenceJob RunArguments::job(const Package& package) const {
     return of_bag.job(package);
   }
   SequenceJob job;
-  if (out.empty() && !rerun) throw InvalidArgument("--out is required: see `egosgm run --help`");
+  if (out.empty() && !rerun && !show) throw InvalidArgument("--out is required: see `egosgm run --help`");
   job.options = method.options();
   job.kinds = parse_write_list(write);
   if (interpolate) job.kinds.insert("interpolated");
@@ -137,7 +145,11 @@ SequenceJob RunArguments::job(const Package& package) const {
   }
   if (package.take_over) {
     const std::optional<VideoArguments> videos = input.videos();
-    const std::string why = rerun ? "--rerun" : has_recording() ? "--out " + out : videos ? videos->left : bag.bag;
+    const std::string why = rerun             ? "--rerun"
+                            : show            ? "--show"
+                            : has_recording() ? "--out " + out
+                            : videos          ? videos->left
+                                              : bag.bag;
     if (!why.empty()) package.take_over(why);
   }
   job.source = source_of(*this, package);
@@ -147,8 +159,9 @@ SequenceJob RunArguments::job(const Package& package) const {
   expect_takeable(*this, job);
   if (job.source->has_no_files() && has_folder()) job.kinds.insert("left");
   if (has_folder()) job.out = folder_of(*this, job);
-  if (has_recording() || rerun) {
-    job.sink = package.take(has_recording() ? out : "", rerun);
+  if (has_sink()) {
+    job.sink = package.take(has_recording() ? out : "", rerun, show);
+    job.sink_takes_all = has_recording() || rerun;
   }
   job.trace = job.out.named_file("--trace", trace);
   job.save_config = job.out.named_file("--save-config", method.save_config);

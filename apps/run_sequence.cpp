@@ -87,7 +87,7 @@ class Run {
     if (has_folder()) folder_.begin(report_.identity());
     if (job.kinds.contains("reason")) report_.add_reasons();
     outputs_.emplace(folder_.path(), job.kinds, size_, job.options, sequence_.calibration, cloud_options_);
-    if (sink_) outputs_->make_maps({Output::kVariance, Output::kReason});
+    if (sink_ && job.sink_takes_all) outputs_->make_maps({Output::kVariance, Output::kReason});
     if (job.trace.empty()) return;
     trace_.emplace(job.trace);
     pipeline_.record_commands(true);

@@ -25,6 +25,7 @@ inline constexpr const char* kRunObjects = "objects.csv";
 struct SequenceJob {
   std::shared_ptr<vision::FrameSource> source;
   std::shared_ptr<FrameSink> sink;  // null: the folder alone takes what the run makes
+  bool sink_takes_all = true;       // false: the disparity alone
   std::string input;                // the arguments that named the sequence, for messages
   PipelineOptions options;
   std::string poses_file;          // empty: stereo odometry,

@@ -157,9 +157,10 @@ class Outputs : public app::FrameSink {
       frame["frame_id"] = pair.camera;
       if (pair.stamp_ns) frame["stamp_ns"] = *pair.stamp_ns;
       Frame result{.maps = {}, .report = made.report};
-      result.maps["disparity"] = array_of(maps.disparity.clone());
-      result.maps["variance"] = array_of(maps.variance.clone());
-      result.maps["reason"] = array_of(maps.reason.clone());
+      for (const auto& [name, map] :
+           {std::pair{"disparity", &maps.disparity}, {"variance", &maps.variance}, {"reason", &maps.reason}}) {
+        if (!map->empty()) result.maps[name] = array_of(map->clone());
+      }
       const std::optional<Motion>& motion = made.motion.motion;
       outputs_.call("take", frame, result,
                     motion ? py::object(array_of(motion->current_from_previous)) : py::object(py::none()));
@@ -243,9 +244,9 @@ int main_of(const std::vector<std::string>& arguments, const py::object& package
           package.attr("VideoSource")(text_of(videos.left), text_of(videos.right), text_of(calib)), range, out);
     });
   };
-  hooks.take = [&](const std::string& file, bool viewer) {
+  hooks.take = [&](const std::string& file, bool viewer, bool page) {
     return in_python([&]() -> std::shared_ptr<app::FrameSink> {
-      return std::make_shared<Outputs>(package.attr("Outputs")(text_of(file), viewer));
+      return std::make_shared<Outputs>(package.attr("Outputs")(text_of(file), viewer, page));
     });
   };
   const py::object read = package.attr("read_calibration");

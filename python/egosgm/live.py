@@ -10,20 +10,20 @@ import sys
 import threading
 import time
 import urllib.parse
-from typing import Any, Deque, Iterator, Optional, Sequence, Tuple, Union
+from typing import Any, Deque, Dict, Iterator, Optional, Sequence, Tuple, Union
 
 from . import _egosgm
 from .arguments import Parser, counted, expect_new_folder, say, tell
 from .calibration.raw_pairs import RawPair, is_camera, open_pairs
 from .calibration.rectify import Rectifier, SequenceFolder, add_calibration, unit_m
-from .drive import VideoFrame, run
+from .drive import run
 from .viewer import RerunOutput
 
 import cv2
 import numpy as np
 
 _MOST_WAIT_S = 5.0
-_HTML = b"""<!doctype html><title>egosgm live</title><link rel=icon href=data:,><style>body{margin:0;background:#111;color:#eee;font:16px sans-serif}img{width:100%}</style>
+_HTML = b"""<!doctype html><title>egosgm</title><link rel=icon href=data:,><style>body{margin:0;background:#111;color:#eee;font:16px sans-serif}img{width:100%}</style>
 <p id=state>waits for pictures</p><img id=picture><script>
 (async () => {
   for (let number = 0;;) {
@@ -185,13 +185,29 @@ class Page:
         self._server.server_close()
 
 
-def picture_of(frame: VideoFrame, smallest: int, disparities: int) -> Any:
+def picture_of(left: Any, disparity: Any, smallest: int, disparities: int) -> Any:
     """The left image above its disparities, near red and far blue, black where there is none. They are searched from `smallest` on."""
-    left = frame.left if frame.left.dtype == np.uint8 else (frame.left >> 8).astype(np.uint8)
+    left = left if left.dtype == np.uint8 else (left >> 8).astype(np.uint8)
     left = np.repeat(left[..., None], 3, 2) if left.ndim == 2 else left[..., :3]
-    is_there = np.isfinite(frame.disparity) & (frame.disparity > _egosgm.INVALID_DISPARITY)
-    steps = np.clip(np.where(is_there, frame.disparity - smallest, 0) * (255 / disparities), 0, 255).astype(np.uint8)
+    is_there = np.isfinite(disparity) & (disparity > _egosgm.INVALID_DISPARITY)
+    steps = np.clip(np.where(is_there, disparity - smallest, 0) * (255 / disparities), 0, 255).astype(np.uint8)
     return np.vstack([left, cv2.applyColorMap(steps, cv2.COLORMAP_TURBO)[..., ::-1] * is_there[..., None].astype(np.uint8)])
+
+
+class PageOutput:
+    """The page of a run, `egosgm run --show`."""
+
+    def __init__(self, options: Dict[str, Any]) -> None:
+        self._range, self._page = (options["min_disparity"], options["disparities"]), Page()
+        say(f"{self._page.address} shows the run")
+
+    def add(self, frame: Any, maps: _egosgm.Frame, motion: Any, calibration: _egosgm.Calibration) -> None:
+        self._page.show(picture_of(frame.left, maps.disparity, *self._range), f"frame {frame.name}, density {100 * maps.report.density:.1f} %")
+
+    def finish(self) -> None:
+        self._page.close()
+
+    give_up = finish
 
 
 def _parser() -> Parser:
@@ -253,7 +269,7 @@ def main(arguments: Sequence[str]) -> int:
             rate = (len(shown_s) - 1) / max(shown_s[-1] - shown_s[0], 1e-9)
             state = f"{rate:.1f} pairs/s, {1000 * (shown_s[-1] - pairs.taken_s):.0f} ms old, {pairs.dropped} dropped"
             if page:
-                page.show(picture_of(frame, int(options.get("min_disparity", 0)), int(options.get("disparities", 128))), state)
+                page.show(picture_of(frame.left, frame.disparity, int(options.get("min_disparity", 0)), int(options.get("disparities", 128))), state)
             if viewer:
                 viewer.add(frame, frame.maps, frame.motion, frame.calibration)
             if record:

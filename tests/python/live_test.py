@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import threading
-import types
 import urllib.error
 import urllib.request
 
@@ -201,8 +200,7 @@ def test_what_fails_at_the_end_leaves_nothing_open(cameras, calib, tmp_path, mon
 
 def test_the_picture_tells_far_from_near_and_from_none():
     disparity = np.array([[egosgm.INVALID_DISPARITY, np.nan, -16, -1, 0, 46]], np.float32)
-    frame = types.SimpleNamespace(left=np.zeros((1, 6), np.uint8), disparity=disparity)
-    colours = live.picture_of(frame, -16, 64)[1].astype(int)
+    colours = live.picture_of(np.zeros((1, 6), np.uint8), disparity, -16, 64)[1].astype(int)
     assert not colours[:2].any()
     is_near = colours[:, 0] > colours[:, 2]  # more red than blue
     assert is_near.tolist() == [False] * 5 + [True]
@@ -232,6 +230,34 @@ def test_an_interrupt_ends_it_and_what_was_recorded_is_whole(cameras, calib, tmp
         signal.signal(signal.SIGINT, before)
     assert True not in late
     assert 1 <= len(egosgm.open_folder(tmp_path / "record").frames) <= 2
+
+
+def test_a_run_shows_its_frames_and_writes_what_it_writes_alone(street_folder, tmp_path, monkeypatch, capfd):
+    shown, closed, shows, closes = [], [], live.Page.show, live.Page.close
+    monkeypatch.setattr(live.Page, "show", lambda page, picture, state: (shown.append((picture, state)), shows(page, picture, state)))
+    monkeypatch.setattr(live.Page, "close", lambda page: (closed.append(page), closes(page)))
+    words = ["run", str(street_folder), "--set", "disparities=48", "--set", "paths=4", "--set", "min_disparity=2"]
+    assert run_tool([*words, "--out", str(tmp_path / "alone")]) == 0 and not shown
+    assert run_tool([*words, "--out", str(tmp_path / "shown"), "--show"]) == 0
+    assert re.search(r"egosgm: http://127.0.0.1:\d+/ shows the run", capfd.readouterr().err)
+    alone, beside = ({file.relative_to(tmp_path / name): file.read_bytes() for file in (tmp_path / name).rglob("*") if file.is_file() and file.name != "report.json"}
+                     for name in ("alone", "shown"))
+    assert alone == beside and len(alone) == FRAMES + 1
+    expected = list(egosgm.run(street_folder, outputs="disparity", min_disparity=2, **OPTIONS))
+    assert len(shown) == FRAMES and len(closed) == 1
+    for frame, (picture, state) in zip(expected, shown):
+        np.testing.assert_array_equal(picture, live.picture_of(frame.left, frame.disparity, 2, 48))
+        assert state.startswith(f"frame {frame.name}, density ")
+    assert run_tool([*words, "--show"]) == 0 and len(shown) == 2 * FRAMES  # it writes nothing then
+    assert run_tool([*words, "--show", "--write", "variance"]) == 2 and "--show: --write" in capfd.readouterr().err
+
+
+def test_a_page_makes_no_other_maps_than_the_disparity(street_folder, monkeypatch):
+    from egosgm.bag import program as bag_program
+    taken = []
+    monkeypatch.setattr(bag_program.Outputs, "take", lambda _, frame, maps, motion: taken.append((maps.disparity is None, maps.variance is None, maps.reason is None)))
+    assert run_tool(["run", str(street_folder), "--set", "disparities=48", "--show"]) == 0
+    assert set(taken) == {(False, True, True)}
 
 
 def test_the_page_gives_each_newer_picture_once_and_ends(monkeypatch):

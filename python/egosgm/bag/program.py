@@ -118,10 +118,17 @@ class VideoSource:
 
 
 class Outputs:
-    """Who takes the maps of a run (apps/frame_sink.h): a recording, a viewer, or both."""
+    """Who takes the maps of a run (apps/frame_sink.h): a recording, a viewer, a page in the browser, or several of them."""
 
-    def __init__(self, file: str, viewer: bool) -> None:
+    def __init__(self, file: str, viewer: bool, page: bool = False) -> None:
         self._file, self._viewer, self._outputs = pathlib.Path(file) if file else None, viewer, []
+        self._page_output: Any = None
+        if page:
+            try:
+                from ..live import PageOutput
+            except ImportError as error:
+                raise _egosgm.InvalidArgument(f"--show needs OpenCV ({error}): pip install opencv-python-headless, or apt install python3-opencv") from None
+            self._page_output = PageOutput
         if file and os.path.lexists(file):
             raise _egosgm.InvalidArgument(f"--out {file}: is there already, and stays: give another name, or remove it first")
         if self._file and not self._file.parent.is_dir():
@@ -133,6 +140,8 @@ class Outputs:
             self._outputs.append(McapOutput(self._file, options) if self._file.suffix == ".mcap" else RerunOutput(self._file))
         if self._viewer:
             self._outputs.append(RerunOutput())
+        if self._page_output:
+            self._outputs.append(self._page_output(options))
 
     def take(self, frame: Dict[str, Any], maps: _egosgm.Frame, motion: Any) -> None:
         for output in self._outputs:
