@@ -131,10 +131,11 @@
 #define EGOSGM_DYNAMIC_LEAST_PX 1.0f
 #define EGOSGM_DYNAMIC_MOST_PX 3.0f
 #define EGOSGM_DYNAMIC_DEPTH_VOTES 22
-// A pixel is like a block where their disparities differ by no more than this. It is marked where one of its 3x3 blocks
-// that are like it moves for every SHARE that do not.
+// A pixel is like a block where their disparities differ by no more than this. Of the blocks that are like it
+// and REACH to all sides, one moves for every SHARE that do not: then the pixel is marked.
 #define EGOSGM_DYNAMIC_ALIKE_PX 1.0f
 #define EGOSGM_DYNAMIC_ALIKE_PART 0.03f
+#define EGOSGM_DYNAMIC_REACH 2
 #define EGOSGM_DYNAMIC_SHARE 3
 
 // Reasons looks this many pixels to all sides for texture: it is flat where grey values two columns apart differ by

@@ -232,8 +232,9 @@ COMPILED_ONCE void mark_row(const WorkItem at, const ImageSize size, const Image
   const int end_y = y + 1 < blocks.height ? side * (y + 1) : size.height;
   FOR_EACH(x, blocks.width) {
     const int end_x = x + 1 < blocks.width ? side * (x + 1) : size.width;
-    const int left = max(x - 1, 0), right = min(x + 1, blocks.width - 1);
-    const int top = max(y - 1, 0), bottom = min(y + 1, blocks.height - 1);
+    const int reach = EGOSGM_DYNAMIC_REACH;
+    const int left = max(x - reach, 0), right = min(x + reach, blocks.width - 1);
+    const int top = max(y - reach, 0), bottom = min(y + reach, blocks.height - 1);
     int any = 0;
     for (int v = top; v <= bottom; ++v) {
       for (int u = left; u <= right; ++u) any |= block_marks[(size_t)v * blocks.width + u] == 2;

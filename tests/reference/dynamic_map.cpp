@@ -251,7 +251,7 @@ std::vector<std::uint8_t> dynamic_map(shared::ImageSize size, const LeftView& la
       const float most = kDynamicAlikePx + kDynamicAlikePart * std::max(d, 0.0f);
       int moving = 0, others = 0;
       finest.grid.around(std::min(x / kDynamicBlock, finest.grid.width - 1),
-                         std::min(y / kDynamicBlock, finest.grid.height - 1), 1, [&](int u, int v) {
+                         std::min(y / kDynamicBlock, finest.grid.height - 1), kDynamicReach, [&](int u, int v) {
                            const Block& block = finest.blocks[finest.grid.at(u, v)];
                            if (!(std::abs(block.disparity - d) <= most)) return;
                            moving += block.moves;

@@ -34,6 +34,7 @@ inline constexpr float kDynamicMostPx = 3.0f;
 inline constexpr float kDynamicNewPx = 1.5f;
 inline constexpr float kDynamicPart = 0.05f;
 inline constexpr int kDynamicRatioTenths = 7;
+inline constexpr int kDynamicReach = 2;
 inline constexpr int kDynamicShare = 3;
 inline constexpr int kDynamicVotes = 6;
 inline constexpr float kDoubtfulVariancePx2 = 16.0f;
