@@ -276,8 +276,7 @@ BoxValues ObjectTracker::State::costs(const Box& box, const BoxValues& dispariti
   BoxValues of_pixels(box.area(), NAN);
   MovedRow seen;
   for (int y = box.top; y < box.bottom; ++y) {
-    const auto row = disparities.begin() + static_cast<std::ptrdiff_t>(box.index(box.left, y));
-    back.of_row(box.left, y, {row, row + box.width()}, seen);
+    back.of_row(box.left, y, &disparities[box.index(box.left, y)], box.width(), seen);
     for (int x = box.left; x < box.right; ++x) {
       const auto i = static_cast<std::size_t>(x - box.left);
       of_pixels[box.index(x, y)] = cost_of({x, y}, seen.u[i], seen.v[i], seen.d[i]);
@@ -564,8 +563,7 @@ SceneFlow ObjectTracker::State::scene_flow() const {
   };
   MovedRow there;
   for (int y = 0; y < size.height; ++y) {
-    const float* row = last.filled.row<float>(y);
-    by_camera.of_row(0, y, {row, row + size.width}, there);
+    by_camera.of_row(0, y, last.filled.row<float>(y), size.width, there);
     for (int x = 0; x < size.width; ++x) {
       const auto i = static_cast<std::size_t>(x);
       write(x, y, there.u[i], there.v[i], there.d[i]);

@@ -28,10 +28,10 @@ void move_row(const double* m, int x, int v, const float* d, int count, Pointers
 
 }  // namespace
 
-void PixelMotion::of_row(int x, int v, const std::vector<float>& d, MovedRow& there) const {
-  for (std::vector<float>* each : {&there.u, &there.v, &there.d}) each->resize(d.size());
+void PixelMotion::of_row(int x, int v, const float* d, int count, MovedRow& there) const {
+  for (std::vector<float>* each : {&there.u, &there.v, &there.d}) each->resize(static_cast<std::size_t>(count));
   const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> rows = matrix_;
-  move_row(rows.data(), x, v, d.data(), static_cast<int>(d.size()), {there.u.data(), there.v.data(), there.d.data()});
+  move_row(rows.data(), x, v, d, count, {there.u.data(), there.v.data(), there.d.data()});
 }
 
 }  // namespace egosgm::vision

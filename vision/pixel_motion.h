@@ -39,8 +39,8 @@ class PixelMotion {
     return there.head<3>() / there.w();
   }
 
-  /// The same of pixels x, x + 1, ... of row v, whose disparities are `d`, in floats. NaN: none.
-  void of_row(int x, int v, const std::vector<float>& d, MovedRow& there) const;
+  /// The same of `count` pixels x, x + 1, ... of row v, whose disparities are `d`, in floats. NaN: none.
+  void of_row(int x, int v, const float* d, int count, MovedRow& there) const;
 
  private:
   Eigen::Matrix4d matrix_;

@@ -302,7 +302,7 @@ TEST(MovingObjects, RowsOfPixelsMoveAsEachPixelDoes) {
   for (int i = 0; i < 37; ++i) disparities.push_back(3.0f + 2 * static_cast<float>(i));
   disparities[5] = NAN;
   MovedRow there;
-  move.of_row(11, 90, disparities, there);
+  move.of_row(11, 90, disparities.data(), 37, there);
   int behind = 0;
   for (int i = 0; i < 37; ++i) {
     const auto k = static_cast<std::size_t>(i);
