@@ -49,19 +49,6 @@ TEST(Pipeline, RunsInTwoThreads) {
   EXPECT_TRUE(same_outputs(actual[1], expected[1], settings[1].size));
 }
 
-TEST(Pipeline, GivesTheSameBitsForEveryScheduling) {
-  Setting setting = standard();
-  const Video video(setting);
-  std::vector<std::vector<OutputMemory>> results;
-  for (const Scheduling scheduling : {Scheduling::kAutomatic, Scheduling::kWavefront, Scheduling::kPaths}) {
-    setting.options.banded_sgm.scheduling = scheduling;
-    Pipeline pipeline = make_pipeline(setting);
-    results.push_back(process_all(pipeline, setting, video));
-  }
-  EXPECT_TRUE(same_outputs(results[1], results[0], setting.size));
-  EXPECT_TRUE(same_outputs(results[2], results[0], setting.size));
-}
-
 TEST(Pipeline, GivesTheSameBitsForEveryTuning) {
   Setting setting = standard();
   const Video video(setting);

@@ -251,20 +251,6 @@ class KnownFormats(Brought):
         own.write_text(own.read_text().replace("baseline_m", "baseline_m = 1\nbase"))  # of a format that is known: the program itself says it
         self.assert_refused(["run", *self.with_calibration(own), "--out", folder / "never"], own, "unknown key 'base'")
 
-    def test_nested_lists_and_units_of_opencv(self):
-        f, cx, cy, baseline = self.calibration()
-        k = [[f, 0, cx], [0, f, cy], [0, 0, 1]]
-        for unit, t, fits in ((None, baseline, True), (None, 5.39, False), ("cm", 100 * baseline, True), ("m", 5.39, True)):
-            file = self.new_folder() / "rig.json"
-            file.write_text(json.dumps({"left_camera_matrix": k, "left_distortion": [[0, 0, 0, 0, 0]], "mtx2": k, "dist2": [0, 0, 0, 0, 0],
-                                        "R": numpy.eye(3).tolist(), "T": [[-t], [0], [0]]}))
-            out = self.new_folder() / "out"
-            command = ["rectify", *self.with_calibration(file), "--out", out, *(["--unit", unit] if unit else [])]
-            if fits:
-                self.assert_works(*command)
-            else:
-                self.assert_refused(command, "centimetres (0.0539 m)", "--unit cm", "--unit m")
-
 
 class Names(Brought):
     def test_names_that_are_times_stay(self):

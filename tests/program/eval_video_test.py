@@ -86,14 +86,6 @@ class EvalOverTime(ProgramTest):
             figures.append(video["figures"])
         self.assertEqual(figures[0], figures[1])
 
-    def test_two_series_of_maps_are_two_videos(self):
-        street = self.broken_street()
-        (street / "poses.txt").unlink()
-        maps = self.new_folder()
-        for name, number in (("a_000002", 2), ("a_000003", 3), ("b_000000", 0), ("b_000001", 1)):
-            shutil.copy(street / f"truth/left_disp_occ/{number:06}.png", maps / f"{name}.png")
-        self.assertEqual(self.evaluate(maps, "--sequence", street)["pairs"], 2)
-
     def test_pictures_that_are_no_video_have_their_regions(self):
         folder = self.new_folder()
         for name in ("000000_10", "000001_10"):
@@ -108,13 +100,6 @@ class EvalOverTime(ProgramTest):
         for name, value in {"gained_percent": 100 / 3, "gained_right_percent": 100, "lost_right_percent": 200 / 3}.items():
             self.assertAlmostEqual(figures[name], value, msg=name)
         self.assertRegex(self.assert_works("eval-video", estimate, truth, "--against", against), r"lost_right_percent +66\.6667")
-
-    def test_a_truth_of_one_step_says_that_nothing_is_there(self):
-        sky, hole_and_surface = self.maps([1 / 256, 1 / 256]), self.maps([0, 4])
-        for estimate, wrong, filled in ((sky, 0, 100), (hole_and_surface, 50, 50)):
-            regions = self.evaluate(estimate, sky)["regions"]
-            self.assertEqual([regions["sky"][name] for name in ("wrong_of_all", "bad_or_missing", "interpolated", "filled")], [wrong] * 3 + [filled])
-            self.assertIsNone(regions["all"]["density"])
 
     def test_reasons_of_a_run_tell_what_was_trusted(self):
         out, truth = self.new_folder() / "out", self.street / "truth/left_disp_noc"

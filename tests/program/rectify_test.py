@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """egosgm rectify: raw images of a known rig. Environment as for program_case.py."""
 import csv
+import json
 import math
 import os
 import re
@@ -222,6 +223,21 @@ class Rectify(RectifyTest):
             numpy.testing.assert_array_equal(read_grey(out / f"image_{side}/000000.png"), expected)
         (folder / "one.mpo").write_bytes(jpegs[0])
         self.assert_refused(["rectify", "--side-by-side", folder / "one.mpo", "--calib", self.street / "calib.txt", "--out", folder / "never"], "does not hold two pictures")
+
+    def test_a_sequence_of_jpegs_gives_what_it_gives_of_pngs(self):
+        jpegs, errors = self.broken_street(), []
+        for file in jpegs.glob("image_*/*.png"):
+            cv2.imwrite(str(file.with_suffix(".jpg")), read_grey(file))
+            file.unlink()
+        for street in (self.street, jpegs):
+            out = self.new_folder() / "out"
+            self.assert_works("run", street, "--out", out, "--quiet", "--disparities", 64)
+            errors.append(json.loads(self.assert_works("eval", out, self.street, "--json"))["pooled"]["bad_or_missing"])
+        self.assertAlmostEqual(*errors, delta=1)
+        self.assertEqual(self.examine(jpegs)["rows"]["verdict"], "ok")
+        file = jpegs / "image_1/000001.jpg"
+        os.truncate(file, file.stat().st_size - 200)
+        self.assertIn(str(file), self.assert_works("run", jpegs, "--out", self.new_folder() / "out"))
 
     def test_pairs_are_those_of_equal_names(self):
         raw = self.new_folder()

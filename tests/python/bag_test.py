@@ -1074,16 +1074,6 @@ def png_of(pixels):
     return file.getvalue()
 
 
-@pytest.mark.parametrize("image", [lambda v: (7000 + 3 * v.astype(np.uint16)).astype(np.uint16), lambda v: (51241 + 4 * v.astype(np.uint16)).astype(np.uint16)])
-def test_sixteen_bits_with_a_pedestal_and_a_hot_pixel(image, tmp_path, street, frames, capfd):
-    def hot(pixels):
-        wide = image(pixels)
-        wide[20, 30] = 65535
-        return wide
-    said = told_of(capfd, drive_of(street, frames, image=hot).write(tmp_path / "drive"))
-    assert "no motion" not in said and "doctor" not in said
-
-
 @pytest.mark.parametrize("per_mille", [0, 1, 4, 8])
 def test_highlights_of_sixteen_bits_cost_no_motion(per_mille, street, frames):
     """A lamp, many times as bright as the rest."""
@@ -1233,16 +1223,3 @@ def test_doctor_looks_at_bags(tmp_path, street, frames, capfd):
     findings = examined(capfd, between, "--max-skew-ms", 50)
     assert findings["times"]["verdict"] == "problem" and "other moments" in findings["times"]["text"]
     assert list(findings) == ["images", "calibration", "times"]
-
-
-def test_doctor_takes_the_files_of_both_cameras(tmp_path, street, frames, capfd):
-    """And not the one that lies beside the first, by its name."""
-    pytest.importorskip("cv2")
-    c = street.calibration
-    for name, baseline_m in (("left", 0), ("right", 2 * c.baseline_m), ("other", c.baseline_m)):
-        (tmp_path / f"{name}.yaml").write_text(
-            f"image_width: {WIDTH}\nimage_height: {HEIGHT}\ncamera_matrix: {{rows: 3, cols: 3, data: [{c.fx}, 0, {c.cx}, 0, {c.fy}, {c.cy}, 0, 0, 1]}}\n"
-            f"projection_matrix: {{rows: 3, cols: 4, data: [{c.fx}, 0, {c.cx}, {-c.fx * baseline_m}, 0, {c.fy}, {c.cy}, 0, 0, 0, 1, 0]}}\n")
-    bag = record("mcap", tmp_path / "drive", street, frames)
-    found = examined(capfd, bag, "--calib", tmp_path / "left.yaml", tmp_path / "other.yaml")
-    assert "baseline 0.54 m" in found["calibration"]["text"]

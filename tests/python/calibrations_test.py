@@ -79,6 +79,7 @@ RAW = {
     "nested.json": json.dumps(dict(K1=K, D1=[LENS], K2=K, D2=[LENS], R=EYE, T=[[-B], [0], [0]])),
     "nested.yaml": yaml.safe_dump(dict(K1=K, D1=LENS, K2=K, D2=LENS, R=EYE, T=[-B, 0, 0])),
     "names.yaml": yaml.safe_dump(dict(left_camera_matrix=K, left_distortion=LENS, right_camera_matrix=K, right_distortion=LENS, R=EYE, T=[-B, 0, 0])),
+    "numbered.json": json.dumps(dict(left_camera_matrix=K, left_distortion=[LENS], mtx2=K, dist2=LENS, R=EYE, T=[[-B], [0], [0]])),
     "others.json": json.dumps(dict(mtx_l=K, dist_l=[LENS], mtx_r=K, dist_r=[LENS], rotation_matrix=EYE, translation_vector=[[-B], [0], [0]])),
     "in_groups.json": json.dumps(dict(left=dict(camera_matrix=K, dist_coeffs=LENS), right=dict(camera_matrix=K, dist_coeffs=LENS),
                                       stereo=dict(R=EYE, T=[-B, 0, 0]))),
@@ -422,7 +423,7 @@ def test_what_was_edited_is_read_or_refused(tmp_path):
 
 def test_units_are_never_guessed(tmp_path):
     (tmp_path / "chain.yaml").write_text(kalibr(LENS, T_cn_cnm1=[[1, 0, 0, -30.0], *SHIFT[1:]]))
-    with pytest.raises(egosgm.InvalidArgument, match="centimetres .0.3 m. or millimetres .0.03 m."):
+    with pytest.raises(egosgm.InvalidArgument, match="centimetres .0.3 m. or millimetres .0.03 m..*--unit cm.*--unit mm"):
         egosgm.read_calibration(tmp_path / "chain.yaml")
     expect_raw(egosgm.read_calibration(tmp_path / "chain.yaml", unit_m=0.01))
     for name in ("own.txt", "q.yml"):

@@ -130,7 +130,6 @@ def test_an_edited_report_is_refused(run, entry):
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.filterwarnings("error")
 def test_cubes_that_are_too_many_to_tell_apart_are_refused(run):
     for voxel in ("1e-12", "1e-300", "1e-308"):
         with pytest.raises(egosgm.InvalidArgument, match="--voxel 1e-.*is too small for points that lie"):

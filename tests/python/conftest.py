@@ -54,3 +54,17 @@ def videos(frames, tmp_path):
             writer.write(image)
         writer.release()
     return files
+
+
+@pytest.fixture
+def rig(tmp_path):
+    """The calibration of cameras whose images are raw, as OpenCV writes it."""
+    cv2 = pytest.importorskip("cv2")
+    matrix = np.array([[300, 0, 170], [0, 300, 50], [0, 0, 1.0]])
+    file = str(tmp_path / "rig.yml")
+    storage = cv2.FileStorage(file, cv2.FILE_STORAGE_WRITE)
+    values = dict(M1=matrix, D1=np.array([[-0.1, 0.02, 0, 0, 0]]), M2=matrix, D2=np.zeros((1, 5)), R=np.eye(3), T=np.array([[-0.25], [0.0], [0.0]]))
+    for name, value in values.items():
+        storage.write(name, value)
+    storage.release()
+    return file

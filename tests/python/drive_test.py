@@ -422,13 +422,6 @@ def test_colour_is_taken_where_grey_is(street, frames):
         pipeline.process(np.zeros((3, HEIGHT, WIDTH), np.uint8), frames[0].right)
 
 
-def test_what_is_nearer_than_the_range_is_told():
-    street = egosgm.SyntheticSequence(frames=1, width=640, height=480, seed=1)
-    pairs = [(street.render(0).left, street.render(0).right)]
-    with pytest.warns(UserWarning, match="of the image is nearer than the range"):
-        list(egosgm.run(pairs, street.calibration, disparities=16, temporal=False))
-
-
 def test_a_look_at_what_is_nearer_takes_little_memory_whatever_the_shape():
     for shape in ((48, 16384), (16384, 48), (16384, 300), (2, 600), (600, 2)):
         image = np.zeros(shape, np.uint8)

@@ -51,30 +51,6 @@ def test_a_sequence_is_matched_and_predicted(pipeline, street, frames):
     assert metrics.density > 60 and metrics.bad_of_valid < 15
 
 
-def test_submit_and_collect_give_the_bits_of_process(pipeline, street, frames):
-    expected = disparities_of(pipeline, street, [(f.left, f.right) for f in frames])
-    pipeline.reset()
-    with pytest.raises(egosgm.InvalidArgument):
-        pipeline.collect()
-    results, own = [], np.empty((HEIGHT, WIDTH), np.float32)
-    for i, frame in enumerate(frames):
-        left = frame.left.copy()
-        pipeline.submit(left, frame.right, street.motion(i) if i else None, {"disparity": own} if i == 0 else "disparity")
-        left[:] = 0  # it was copied
-        if pipeline.under_way == 2:
-            results.append(pipeline.collect())
-    pipeline.submit(frames[0].left, frames[0].right)
-    with pytest.raises(egosgm.InvalidArgument):
-        pipeline.submit(frames[0].left, frames[0].right)
-    results.append(pipeline.collect())
-    assert pipeline.collect().report.unpredicted == "no motion"  # without a motion
-    assert pipeline.under_way == 0
-    assert results[0].disparity is own
-    for result, disparity in zip(results, expected, strict=True):
-        assert (result.disparity == disparity).all()
-    assert results[-1].report.search_fraction < 0.5
-
-
 def test_any_stride_and_depth_gives_the_same_bits(pipeline, street, frames):
     plain = disparities_of(pipeline, street, [(f.left, f.right) for f in frames])
     assert plain[-1].dtype == np.float32 and plain[-1].shape == (HEIGHT, WIDTH)

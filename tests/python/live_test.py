@@ -118,19 +118,13 @@ def test_an_error_of_the_source_comes_after_the_pairs_before_it(frames, cameras,
     np.testing.assert_array_equal(given[-1], frames[-1].left)
 
 
-def test_raw_pairs_are_rectified_on_the_way(frames, cameras, tmp_path):
-    matrix = np.array([[300, 0, 170], [0, 300, 50], [0, 0, 1.0]])
-    storage = cv2.FileStorage(str(tmp_path / "rig.yml"), cv2.FILE_STORAGE_WRITE)
-    values = dict(M1=matrix, D1=np.array([[-0.1, 0.02, 0, 0, 0]]), M2=matrix, D2=np.zeros((1, 5)), R=np.eye(3), T=np.array([[-0.25], [0.0], [0.0]]))
-    for name, value in values.items():
-        storage.write(name, value)
-    storage.release()
+def test_raw_pairs_are_rectified_on_the_way(frames, cameras, rig):
     ended = threading.Event()
     cameras.ends = ended.set
-    pairs = live.LivePairs(0, 1, calib=str(tmp_path / "rig.yml"))
+    pairs = live.LivePairs(0, 1, calib=rig)
     assert ended.wait(60)
     (left, right), = pairs
-    expected = egosgm.Rectification(egosgm.read_opencv_rig(tmp_path / "rig.yml"), WIDTH, HEIGHT)
+    expected = egosgm.Rectification(egosgm.read_opencv_rig(rig), WIDTH, HEIGHT)
     for image, truth in zip((left, right), expected.rectify(frames[-1].left, frames[-1].right)):
         np.testing.assert_array_equal(image, truth)
     assert pairs.calibration.baseline_m == pytest.approx(0.25)

@@ -178,12 +178,3 @@ def test_constants_of_the_method_are_set_by_name(street):
     assert pipeline.options["constants.coarse_match.p1"] == 7
     with pytest.raises(egosgm.InvalidArgument, match="no constant"):
         egosgm.Pipeline(street.calibration, WIDTH, HEIGHT, constants={"coarse_match.p9": 7})
-
-
-def test_the_stub_knows_every_option():
-    import pathlib
-    stub = (pathlib.Path(egosgm.__file__).parent / "_options.pyi").read_text()
-    names = {}
-    exec(compile(stub, "_options.pyi", "exec"), names)
-    assert set(names["PipelineOptions"].__annotations__) == set(egosgm.pipeline_options()) - {"preset"}  # an argument of its own
-    assert names["PipelineOptions"].__annotations__["p2"] is int

@@ -620,21 +620,5 @@ TEST_F(DatasetTest, NoRowBelongsToAFrameThatIsNotThere) {
   EXPECT_TRUE(rows_of_frames({}, 3, "poses.txt", "poses").empty());
 }
 
-TEST(RealData, SequencesOpen) {
-  EGOSGM_REQUIRE_DATA(data);
-  const StereoSequence scene = open_kitti_multiview(data / "kitti2012", "000151", parse_frame_range("7:10"));
-  EXPECT_EQ(numbers_of(scene), (std::vector<int>{7, 8, 9, 10}));
-  EXPECT_FALSE(scene.frames[3].truth_noc.empty());
-  EXPECT_EQ(check_image_sizes(scene), (Size{1242, 375}));
-  EXPECT_EQ(read_images(scene.frames[0]).left.type, kU8);
-  const StereoSequence color = open_kitti_multiview(data / "kitti2015/training", "2");
-  EXPECT_EQ(numbers_of(color), (std::vector<int>{10, 11}));
-  EXPECT_EQ(read_images(color.frames[0]).left.type, kU8);
-  const StereoSequence odometry = open_folder(data / "odometry/sequences/A");
-  EXPECT_EQ(odometry.frames.size(), 51u);
-  EXPECT_EQ(poses_of_frames(odometry, odometry.poses_file).size(), 51u);
-  EXPECT_FALSE(open_folder(data / "middlebury/Motorcycle").frames[0].truth_occ.empty());
-}
-
 }  // namespace
 }  // namespace egosgm::vision

@@ -220,19 +220,5 @@ TEST_F(DisparityIo, WrongTypesAndNamesAreRefused) {
   expect_refused<IoError>([&] { write_disparity(folder_ / "none/d.png", map); }, {"none/d.png", "No such file"});
 }
 
-TEST(RealData, MiddleburyTruthIsRead) {
-  EGOSGM_REQUIRE_DATA(data);
-  const Image truth = read_disparity(data / "middlebury/Motorcycle/disp0GT.pfm");
-  ASSERT_EQ(truth.size(), (Size{741, 497}));
-  std::vector<double> valid = values_of(truth);
-  valid.erase(std::remove(valid.begin(), valid.end(), kInvalidDisparity), valid.end());
-  EXPECT_GT(valid.size(), 300000u);
-  EXPECT_LT(valid.size(), 741u * 497u);
-  const auto [low, high] = std::minmax_element(valid.begin(), valid.end());
-  EXPECT_GT(*low, 5.0);                                           // vmin=7 in its calib.txt
-  EXPECT_LT(*high, 67.0);                                         // vmax=65
-  EXPECT_GT(truth.at<float>(490, 370), truth.at<float>(20, 20));  // the floor in front is nearer than the wall behind
-}
-
 }  // namespace
 }  // namespace egosgm::vision

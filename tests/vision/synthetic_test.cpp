@@ -536,10 +536,5 @@ TEST_F(SyntheticFiles, FolderHoldsWhatIsPromisedAndNothingElse) {
   EXPECT_EQ(names, expected);
 }
 
-TEST_F(SyntheticFiles, FolderThatCannotBeMadeIsNamed) {
-  std::ofstream(folder_) << "a file, not a folder";
-  testing::expect_refused<IoError>([&] { write_sequence(small_options(), folder_); }, {folder_.string()});
-}
-
 }  // namespace
 }  // namespace egosgm::vision
