@@ -124,7 +124,8 @@
 #define EGOSGM_DYNAMIC_AGREES 24
 #define EGOSGM_DYNAMIC_VOTES 6
 // The last map tells what was hidden and what is new by so many pixels and a part of the disparity. Alone, it
-// contradicts the new one by LEAST pixels to MOST in so many of 5x5 blocks: what differs by more was rather uncovered.
+// contradicts the new one by LEAST pixels to MOST and that part, in so many of 5x5 blocks: what differs by more was
+// rather uncovered.
 #define EGOSGM_DYNAMIC_HIDES_PX 1.0f
 #define EGOSGM_DYNAMIC_NEW_PX 1.5f
 #define EGOSGM_DYNAMIC_PART 0.05f

@@ -88,7 +88,9 @@ COMPILED_ONCE void compare_places_row(const WorkItem at, const ImageSize size, c
     int kinds = ASKED;
     if (seen > expected + EGOSGM_DYNAMIC_HIDES_PX + part) kinds |= HIDDEN;
     if (seen < expected - EGOSGM_DYNAMIC_NEW_PX - part) kinds |= NEW;
-    if (apart > EGOSGM_DYNAMIC_LEAST_PX && apart < EGOSGM_DYNAMIC_MOST_PX) kinds |= seen > expected ? NEARER : FARTHER;
+    if (apart > EGOSGM_DYNAMIC_LEAST_PX && apart < EGOSGM_DYNAMIC_MOST_PX + part) {
+      kinds |= seen > expected ? NEARER : FARTHER;
+    }
     places[block] = kinds | (int)((off_x - whole_x) * ONE) << 8 | (int)((off_y - whole_y) * ONE) << 16;
 
     global const uint* row = codes + (size_t)2 * y * image.width + 2 * x;

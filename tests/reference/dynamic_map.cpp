@@ -101,7 +101,7 @@ void look_at_last_map(Grid image, const LeftView& last, float u, float v, float 
   block.is_asked = true;
   block.was_hidden = seen > expected + kDynamicHidesPx + part;
   block.is_new = seen < expected - kDynamicNewPx - part;
-  const bool contradicts = apart > kDynamicLeastPx && apart < kDynamicMostPx;
+  const bool contradicts = apart > kDynamicLeastPx && apart < kDynamicMostPx + part;
   block.is_nearer = contradicts && seen > expected;
   block.is_farther = contradicts && !(seen > expected);
 }
