@@ -9,7 +9,6 @@
 
 #include "apps/command.h"
 #include "apps/counted.h"
-#include "apps/metrics_json.h"
 #include "apps/option_group.h"
 #include "apps/progress.h"
 #include "apps/truth_pairs.h"
@@ -17,6 +16,7 @@
 #include "egosgm/vision/evaluation.h"
 #include "egosgm/vision/image_io.h"
 #include "host/json_text.h"
+#include "vision/disparity_figures.h"
 #include "vision/estimate_reader.h"
 #include "vision/file_io.h"
 #include "vision/image_values.h"
@@ -102,31 +102,26 @@ Result measure(const vision::EvaluationPairs& found, const EvalArguments& argume
   return result;
 }
 
-template <typename Counts, typename Action>
-void for_each_count(Counts& counts, Action act) {
-  act("truth", counts.truth);
-  act("sky", counts.sky);
-  act("sky_valid", counts.sky_valid);
-  act("valid", counts.valid);
-  act("bad", counts.bad);
-  act("bad_1px", counts.bad_1px);
-  act("d1", counts.d1);
-  act("bad_interpolated", counts.bad_interpolated);
-  act("d1_interpolated", counts.d1_interpolated);
-  act("absolute_error_px", counts.absolute_error_px);
-  act("signed_error_px", counts.signed_error_px);
-}
-
 Json json_of(const DisparityCounts& counts) {
   Json json;
-  for_each_count(counts, [&](const char* name, auto count) { json[name] = count; });
+  vision::for_each_count([&](const char* name, auto count, auto) { json[name] = counts.*count; });
+  return json;
+}
+
+/// In percent, `mae` and `mean_error` in pixels; null where there is nothing to divide by.
+Json json_of(const DisparityMetrics& metrics) {
+  Json json;
+  vision::for_each_metric([&](std::string name, auto metric, auto) {
+    if (name.ends_with("_px")) name.resize(name.size() - 3);
+    json[name] = metrics.*metric;
+  });
   return json;
 }
 
 Json json_of(const vision::EvaluationPairs& found, const Result& result) {
   Json json{{"pairs", Json::array()},
-            {"pooled", app::json_of(result.pooled())},
-            {"mean", app::json_of(result.mean())},
+            {"pooled", json_of(result.pooled())},
+            {"mean", json_of(result.mean())},
             {"without_estimate", Json::array()}};
   for (std::size_t i = 0; i < result.rows.size(); ++i) {
     const Row& row = result.rows[i];
@@ -135,7 +130,7 @@ Json json_of(const vision::EvaluationPairs& found, const Result& result) {
                {"truth", row.files.truth.string()},
                {"truth_pixels", row.counts.truth},
                {"counts", json_of(row.counts)}};
-    entry.update(app::json_of(result.each[i]));
+    entry.update(json_of(result.each[i]));
     json["pairs"].push_back(std::move(entry));
   }
   for (const auto& file : found.without_estimate) json["without_estimate"].push_back(file.string());
@@ -200,8 +195,9 @@ std::vector<DisparityCounts> counts_of(const Json& report, const std::string& fi
   bool is_sound = true;
   try {
     for (const Json& pair : report.at("pairs")) {
-      for_each_count(all.emplace_back(), [&](const char* name, auto& count) {
-        is_sound = read_count(pair.at("counts").at(name), count) && is_sound;
+      all.emplace_back();
+      vision::for_each_count([&](const char* name, auto count, auto) {
+        is_sound = read_count(pair.at("counts").at(name), all.back().*count) && is_sound;
       });
       is_sound = is_sound && are_possible(all.back());
     }
@@ -234,8 +230,8 @@ int merge(const EvalArguments& arguments) {
   if (arguments.json) {
     Json json{{"reports", arguments.reports.size()},
               {"pairs", result.each.size()},
-              {"pooled", app::json_of(result.pooled())},
-              {"mean", app::json_of(result.mean())}};
+              {"pooled", json_of(result.pooled())},
+              {"mean", json_of(result.mean())}};
     if (!result.warnings.empty()) json["warnings"] = result.warnings;
     fmt::print("{}\n", dumped(json, 2));
     return kOk;

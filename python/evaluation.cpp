@@ -11,7 +11,7 @@
 #include "egosgm/vision/render.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
-#include "python/pickling.h"
+#include "vision/disparity_figures.h"
 #include "vision/estimate_reader.h"
 #include "vision/image_values.h"
 #include "vision/pair_with_truth.h"
@@ -46,46 +46,39 @@ py::array color_disparity(const py::object& disparity, std::optional<double> low
   });
 }
 
+/// Makes a property of each member that `for_each` visits, and takes their values to other processes.
+template <typename Value, typename ForEach>
+py::class_<Value> bind_figures(py::module_& module, const char* name, const char* text, ForEach for_each) {
+  py::class_<Value> bound(module, name, text);
+  for_each([&](const char* of, auto member, const char* meaning) { bound.def_readonly(of, member, meaning); });
+  bound.def(py::pickle(
+      [for_each](const Value& value) {
+        py::list stored;
+        for_each([&](auto, auto member, auto) { stored.append(value.*member); });
+        return py::tuple(stored);
+      },
+      [for_each](const py::tuple& stored) {
+        Value value;
+        std::size_t i = 0;
+        for_each([&](auto, auto member, auto) {
+          value.*member = stored[i++].template cast<std::decay_t<decltype(value.*member)>>();
+        });
+        return value;
+      }));
+  return bound;
+}
+
 void bind_disparity(py::module_& module) {
-  auto counts =
-      py::class_<DisparityCounts>(module, "DisparityCounts",
-                                  "What comparing a disparity map with its truth counted; those of several images add "
-                                  "up.");
-  pickle_members<&DisparityCounts::truth, &DisparityCounts::valid, &DisparityCounts::bad, &DisparityCounts::d1,
-                 &DisparityCounts::bad_interpolated, &DisparityCounts::d1_interpolated,
-                 &DisparityCounts::absolute_error_px, &DisparityCounts::sky, &DisparityCounts::sky_valid,
-                 &DisparityCounts::bad_1px, &DisparityCounts::signed_error_px>(counts);
-  counts.def(py::init<>())
-      .def_readonly("truth", &DisparityCounts::truth)
-      .def_readonly("valid", &DisparityCounts::valid)
-      .def_readonly("bad", &DisparityCounts::bad)
-      .def_readonly("d1", &DisparityCounts::d1)
-      .def_readonly("bad_interpolated", &DisparityCounts::bad_interpolated)
-      .def_readonly("d1_interpolated", &DisparityCounts::d1_interpolated)
-      .def_readonly("absolute_error_px", &DisparityCounts::absolute_error_px)
-      .def_readonly("bad_1px", &DisparityCounts::bad_1px)
-      .def_readonly("signed_error_px", &DisparityCounts::signed_error_px, "The sum of estimate - truth.")
-      .def_readonly("sky", &DisparityCounts::sky, "Where the truth says that nothing is there.")
-      .def_readonly("sky_valid", &DisparityCounts::sky_valid)
+  bind_figures<DisparityCounts>(
+      module, "DisparityCounts",
+      "What comparing a disparity map with its truth counted; those of several images add up.",
+      [](auto&& visit) { vision::for_each_count(visit); })
+      .def(py::init<>())
       .def("__add__", [](DisparityCounts a, const DisparityCounts& b) { return a += b; })
       .def_property_readonly("metrics", &vision::metrics_of, "The figures in percent.");
-  auto metrics = py::class_<DisparityMetrics>(module, "DisparityMetrics",
-                                              "Percent of the pixels with truth; bad: off by more than 3 px (KITTI).");
-  pickle_members<&DisparityMetrics::bad_or_missing, &DisparityMetrics::bad_of_valid, &DisparityMetrics::density,
-                 &DisparityMetrics::interpolated, &DisparityMetrics::d1, &DisparityMetrics::d1_interpolated,
-                 &DisparityMetrics::mae_px, &DisparityMetrics::filled, &DisparityMetrics::wrong_of_all,
-                 &DisparityMetrics::bad_1px, &DisparityMetrics::mean_error_px>(metrics);
-  metrics.def_readonly("bad_or_missing", &DisparityMetrics::bad_or_missing)
-      .def_readonly("bad_of_valid", &DisparityMetrics::bad_of_valid, "Percent of the pixels with an estimate.")
-      .def_readonly("density", &DisparityMetrics::density, "Percent of the pixels with a surface.")
-      .def_readonly("interpolated", &DisparityMetrics::interpolated, "After background interpolation (KITTI 2012).")
-      .def_readonly("d1", &DisparityMetrics::d1)
-      .def_readonly("d1_interpolated", &DisparityMetrics::d1_interpolated, "KITTI 2015's official figure.")
-      .def_readonly("mae_px", &DisparityMetrics::mae_px)
-      .def_readonly("bad_1px", &DisparityMetrics::bad_1px, "Off by more than 1 px, or missing.")
-      .def_readonly("mean_error_px", &DisparityMetrics::mean_error_px, "Signed: below 0, pixels look too far.")
-      .def_readonly("filled", &DisparityMetrics::filled)
-      .def_readonly("wrong_of_all", &DisparityMetrics::wrong_of_all, "What is missing does not count.");
+  bind_figures<DisparityMetrics>(module, "DisparityMetrics",
+                                 "Percent of the pixels with truth; bad: off by more than 3 px (KITTI).",
+                                 [](auto&& visit) { vision::for_each_metric(visit); });
   module.def("compare_disparity", &compare, py::arg("estimate"), py::arg("truth"),
              "Compares two H x W maps over the pixels that have truth, as KITTI's development kits do.");
   module.def("mean_of", &vision::mean_of, py::arg("images"), "The mean of each image's figures (KITTI 2012).");

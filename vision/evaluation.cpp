@@ -8,6 +8,7 @@
 #include "egosgm/error.h"
 #include "egosgm/vision/disparity_io.h"
 #include "vision/disparity_error.h"
+#include "vision/disparity_figures.h"
 #include "vision/image_values.h"
 
 namespace egosgm::vision {
@@ -61,17 +62,7 @@ class Mean {
 }  // namespace
 
 DisparityCounts& DisparityCounts::operator+=(const DisparityCounts& other) {
-  truth += other.truth;
-  valid += other.valid;
-  bad += other.bad;
-  bad_1px += other.bad_1px;
-  d1 += other.d1;
-  bad_interpolated += other.bad_interpolated;
-  d1_interpolated += other.d1_interpolated;
-  absolute_error_px += other.absolute_error_px;
-  signed_error_px += other.signed_error_px;
-  sky += other.sky;
-  sky_valid += other.sky_valid;
+  for_each_count([&](auto, auto count, auto) { this->*count += other.*count; });
   return *this;
 }
 
@@ -112,22 +103,13 @@ DisparityMetrics metrics_of(const DisparityCounts& counts) {
 }
 
 DisparityMetrics mean_of(const std::vector<DisparityMetrics>& images) {
-  const auto mean = [&](double DisparityMetrics::*figure) {
-    Mean result;
-    for (const DisparityMetrics& image : images) result.add(image.*figure);
-    return result.value();
-  };
-  return {.bad_or_missing = mean(&DisparityMetrics::bad_or_missing),
-          .bad_1px = mean(&DisparityMetrics::bad_1px),
-          .bad_of_valid = mean(&DisparityMetrics::bad_of_valid),
-          .density = mean(&DisparityMetrics::density),
-          .interpolated = mean(&DisparityMetrics::interpolated),
-          .d1 = mean(&DisparityMetrics::d1),
-          .d1_interpolated = mean(&DisparityMetrics::d1_interpolated),
-          .mae_px = mean(&DisparityMetrics::mae_px),
-          .mean_error_px = mean(&DisparityMetrics::mean_error_px),
-          .filled = mean(&DisparityMetrics::filled),
-          .wrong_of_all = mean(&DisparityMetrics::wrong_of_all)};
+  DisparityMetrics means;
+  for_each_metric([&](auto, auto metric, auto) {
+    Mean mean;
+    for (const DisparityMetrics& image : images) mean.add(image.*metric);
+    means.*metric = mean.value();
+  });
+  return means;
 }
 
 Image interpolate_background(const Image& disparity) {
