@@ -299,93 +299,10 @@ class Bag:
         pairing = Pairing(self._bound_ns)
         self.gaps = pairing.gaps
         pairing.gaps.parts = list(self._parts.notes)
-        times: List[int] = []
-        poses: List[NDArray[np.float64]] = []
         with self._opened() as reader:
             self.cameras = self._find_cameras(reader)
             pairing.gaps.has_no_stamps = all(stamp_ns(m) == 0 for m in itertools.islice(self._first_messages(reader, self.images[0]), 2))
-            if self._pose_topic:
-                times, poses = self._read_poses(reader)
-            connections = [c for c in reader.connections if c.topic in (*self.images, *self.infos)]
-            number, last, changed = 0, None, ""
-
-            def image_of(message: Any, stamp: int, topic: str) -> Optional[NDArray[Any]]:
-                """None of one that is broken, unless all are."""
-                try:
-                    image = grey_of(message)
-                    if image.shape != (self.cameras.size[1], self.cameras.size[0]):
-                        raise _egosgm.InvalidArgument(f"an image of {image.shape[1]}x{image.shape[0]} px, while the camera info is of "
-                                                      f"{self.cameras.size[0]}x{self.cameras.size[1]}")
-                    return image
-                except (_egosgm.InvalidArgument, ValueError) as error:
-                    broken(topic, stamp, error)
-                    return None
-
-            def broken(topic: str, stamp: int, error: Exception) -> None:
-                pairing.gaps.broken.append(f"{topic} at {stamp // 10**9}.{stamp % 10**9:09d} s: {str(error).partition(chr(10))[0] or type(error).__name__}")
-                if number == 0 and len(pairing.gaps.broken) >= _MOST_BROKEN:
-                    raise _egosgm.InvalidArgument(f"{self.path}: {pairing.gaps.broken[0]}")
-
-            def frame_of(pair: Any) -> Iterator[BagFrame]:
-                nonlocal number, last
-                (stamp, left), (_, right) = pair
-                if not 0 <= stamp < 2**31 * 10**9:
-                    raise _egosgm.InvalidArgument(f"{self.images[0]}: a stamp of {stamp / 1e9:.0f} s, which is not from 1970 to 2038")
-                if stamp == last:
-                    pairing.gaps.repeated += 1
-                    return
-                steps_back = last is not None and stamp < last
-                if steps_back:
-                    pairing.gaps.steps_back += 1
-                elif last is not None and stamp - last > 1.5e6 * pairing.gaps.interval_ms:
-                    pairing.gaps.gaps.append((number, (stamp - last) / 1e9))
-                images = [image_of(message, stamp, topic) for message, topic in zip((left, right), self.images)]
-                if images[0] is None or images[1] is None:
-                    return
-                if images[0].dtype != images[1].dtype:
-                    raise _egosgm.InvalidArgument(f"{self.images[0]} has {images[0].dtype}, {self.images[1]} has {images[1].dtype}: both need one depth")
-                images = self.cameras.rectified(*images)
-                pose = _pose_at(times, poses, stamp)
-                pairing.gaps.without_pose += bool(self._pose_topic) and pose is None
-                frame = BagFrame(number, stamp, left.header.frame_id, *images, last is None or steps_back, pose)
-                number, last = number + 1, stamp
-                yield frame
-
-            def stamped() -> Iterator[Tuple[int, int, Any]]:
-                for connection, time, raw in reader.messages(connections=connections):
-                    try:
-                        message = reader.deserialize(raw, connection.msgtype)
-                    except Exception as error:  # whatever a decoder of what is broken may raise
-                        broken(connection.topic, time, error)
-                        continue
-                    if connection.topic in self.images:
-                        stamp = time if pairing.gaps.has_no_stamps else stamp_ns(message)
-                        yield stamp, self.images.index(connection.topic), message
-                        continue
-                    if is_set(message) and _values_of(message) != self._first_infos[connection.topic]:
-                        nonlocal changed  # what was before is a drive of its own
-                        changed = (f"{connection.topic}: another calibration than at the start, from {stamp_ns(message) / 1e9:.3f} s on: cut the bag "
-                                   "there, or give one calibration for all of it by --calib")
-                        return
-
-            for stamp, side, message in _in_order(stamped()):
-                for pair in pairing.add(side, stamp, message):
-                    yield from frame_of(pair)
-            for pair in pairing.end():
-                yield from frame_of(pair)
-        if changed:
-            raise _egosgm.InvalidArgument(changed)
-        if number == 0 and pairing.gaps.broken:
-            raise _egosgm.InvalidArgument(f"{self.path}: no pair is whole: {pairing.gaps.broken[0]}")
-        if number == 0:
-            apart = pairing.gaps.nearest_ms
-            if apart is not None and pairing.gaps.are_other_moments(apart):
-                raise _egosgm.InvalidArgument(f"{self.path}: no left image has a right one of its time; the nearest stamps differ by {_ms(apart)} at "
-                                              f"{_ms(pairing.gaps.interval_ms)} a frame: left and right are of other moments, so that nothing can be matched")
-            nearest = f"the nearest stamps differ by {_ms(pairing.gaps.nearest_ms)}: allow that by --max-skew-ms" if pairing.gaps.nearest_ms is not None \
-                else "one of the topics has no image"
-            unset = " (images have no stamps here: the times at which they were recorded are taken)" if pairing.gaps.has_no_stamps else ""
-            raise _egosgm.InvalidArgument(f"{self.path}: no left image has a right one of its time; {nearest}{unset}")
+            yield from _Reading(self, reader, pairing).frames()
 
     def _read_poses(self, reader: Any) -> Tuple[List[int], List[NDArray[np.float64]]]:
         poses = []
@@ -400,6 +317,98 @@ class Bag:
             poses.append((stamp_ns(message) or time, world_from_body @ BODY_FROM_OPTICAL if self._pose_axes == "body" else world_from_body))
         poses.sort(key=lambda item: item[0])
         return [time for time, _ in poses], [pose for _, pose in poses]
+
+
+class _Reading:
+    """The frames of a bag, from its start to its end or to another calibration."""
+
+    def __init__(self, bag: Bag, reader: Any, pairing: Pairing) -> None:
+        self._bag, self._reader, self._pairing, self._gaps = bag, reader, pairing, pairing.gaps
+        self._cameras = bag.cameras
+        self._times, self._poses = bag._read_poses(reader) if bag._pose_topic else ([], [])
+        self._number, self._last, self._changed = 0, None, ""
+
+    def frames(self) -> Iterator[BagFrame]:
+        for stamp, side, message in _in_order(self._stamped()):
+            for pair in self._pairing.add(side, stamp, message):
+                yield from self._frame_of(*pair)
+        for pair in self._pairing.end():
+            yield from self._frame_of(*pair)
+        if self._changed:
+            raise _egosgm.InvalidArgument(self._changed)
+        if self._number == 0:
+            raise _egosgm.InvalidArgument(f"{self._bag.path}: {self._why_none()}")
+
+    def _stamped(self) -> Iterator[Tuple[int, int, Any]]:
+        connections = [c for c in self._reader.connections if c.topic in (*self._bag.images, *self._bag.infos)]
+        for connection, time, raw in self._reader.messages(connections=connections):
+            try:
+                message = self._reader.deserialize(raw, connection.msgtype)
+            except Exception as error:  # whatever a decoder of what is broken may raise
+                self._note_broken(connection.topic, time, error)
+                continue
+            if connection.topic in self._bag.images:
+                stamp = time if self._gaps.has_no_stamps else stamp_ns(message)
+                yield stamp, self._bag.images.index(connection.topic), message
+                continue
+            if is_set(message) and _values_of(message) != self._bag._first_infos[connection.topic]:  # what was before is a drive of its own
+                self._changed = (f"{connection.topic}: another calibration than at the start, from {stamp_ns(message) / 1e9:.3f} s on: cut the bag "
+                                 "there, or give one calibration for all of it by --calib")
+                return
+
+    def _frame_of(self, left: Tuple[int, Any], right: Tuple[int, Any]) -> Iterator[BagFrame]:
+        """None of a pair that comes again, or that is broken."""
+        stamp, last, topics = left[0], self._last, self._bag.images
+        if not 0 <= stamp < 2**31 * 10**9:
+            raise _egosgm.InvalidArgument(f"{topics[0]}: a stamp of {stamp / 1e9:.0f} s, which is not from 1970 to 2038")
+        if stamp == last:
+            self._gaps.repeated += 1
+            return
+        steps_back = last is not None and stamp < last
+        if steps_back:
+            self._gaps.steps_back += 1
+        elif last is not None and stamp - last > 1.5e6 * self._gaps.interval_ms:
+            self._gaps.gaps.append((self._number, (stamp - last) / 1e9))
+        images = [self._image_of(message, stamp, topic) for (_, message), topic in zip((left, right), topics)]
+        if images[0] is None or images[1] is None:
+            return
+        if images[0].dtype != images[1].dtype:
+            raise _egosgm.InvalidArgument(f"{topics[0]} has {images[0].dtype}, {topics[1]} has {images[1].dtype}: both need one depth")
+        pose = _pose_at(self._times, self._poses, stamp)
+        self._gaps.without_pose += bool(self._bag._pose_topic) and pose is None
+        frame = BagFrame(self._number, stamp, left[1].header.frame_id, *self._cameras.rectified(*images), last is None or steps_back, pose)
+        self._number, self._last = self._number + 1, stamp
+        yield frame
+
+    def _image_of(self, message: Any, stamp: int, topic: str) -> Optional[NDArray[Any]]:
+        """None of one that is broken, unless all are."""
+        try:
+            image = grey_of(message)
+            if image.shape != (self._cameras.size[1], self._cameras.size[0]):
+                raise _egosgm.InvalidArgument(f"an image of {image.shape[1]}x{image.shape[0]} px, while the camera info is of "
+                                              f"{self._cameras.size[0]}x{self._cameras.size[1]}")
+            return image
+        except (_egosgm.InvalidArgument, ValueError) as error:
+            self._note_broken(topic, stamp, error)
+            return None
+
+    def _note_broken(self, topic: str, stamp: int, error: Exception) -> None:
+        broken = self._gaps.broken
+        broken.append(f"{topic} at {stamp // 10**9}.{stamp % 10**9:09d} s: {str(error).partition(chr(10))[0] or type(error).__name__}")
+        if self._number == 0 and len(broken) >= _MOST_BROKEN:
+            raise _egosgm.InvalidArgument(f"{self._bag.path}: {broken[0]}")
+
+    def _why_none(self) -> str:
+        """Why there is no frame."""
+        if self._gaps.broken:
+            return f"no pair is whole: {self._gaps.broken[0]}"
+        none, apart = "no left image has a right one of its time", self._gaps.nearest_ms
+        if apart is not None and self._gaps.are_other_moments(apart):
+            return (f"{none}; the nearest stamps differ by {_ms(apart)} at {_ms(self._gaps.interval_ms)} a frame: left and right are of other moments, "
+                    "so that nothing can be matched")
+        nearest = f"the nearest stamps differ by {_ms(apart)}: allow that by --max-skew-ms" if apart is not None else "one of the topics has no image"
+        unset = " (images have no stamps here: the times at which they were recorded are taken)" if self._gaps.has_no_stamps else ""
+        return f"{none}; {nearest}{unset}"
 
 
 def _ms(duration: float) -> str:
