@@ -437,6 +437,12 @@ def test_stamps_pair_within_their_bound_and_gaps_are_told(tmp_path, street, fram
     assert "1 gap, the longest of 1.500 s before frame 2" in text and "steps back 1 times" in text
     with pytest.raises(egosgm.InvalidArgument, match="nearest stamps differ by 2.000 ms: allow that by --max-skew-ms"):
         list(bags.Bag(path, "/left/image_rect", "/right/image_rect").frames())
+    times = [START + ms * 1_000_000 for ms in (0, 100, 110, 200, 212)]  # where two could be paired, the nearer is
+    path = record("mcap", tmp_path / "nearer", street, [frames[i % FRAMES] for i in range(5)], times=times, left_out=[(1, "right"), (3, "left")],
+                  of_right=lambda i, time: time + (0, 0, 2, 0, -2)[i] * 1_000_000)
+    bag = bags.Bag(path, "/left/image_rect", "/right/image_rect", max_skew_ms=15)
+    assert [frame.stamp_ns for frame in bag.frames()] == [times[0], times[2], times[4]]
+    assert "1 left and 1 right images have no partner;" in bag.gaps.text() and "nearest" not in bag.gaps.text()
 
 
 def test_messages_that_were_received_out_of_order(tmp_path, street, frames):
