@@ -100,21 +100,24 @@ void expect_outputs(const OutputMemory& outputs, const reference::Frame& expecte
   const bool has_prediction = !expected.predicted.disparity.empty();
   const HostMaps predicted = has_prediction ? expected.predicted : empty_maps(size);
   const reference::Pass& pass = expected.passes.back();
-  const std::vector<float> maps[] = {half(expected.output, 0),         half(expected.output_variance, 0),
-                                     half(expected.output, 1),         half(expected.output_variance, 1),
-                                     half(predicted.disparity, 0),     half(masked(predicted).variance, 0),
-                                     half(pass.measured.disparity, 0), half(masked(pass.measured).variance, 0)};
-  const auto actual = outputs.maps();
-  for (std::size_t i = 0; i < actual.size(); ++i) {
-    EXPECT_TRUE(same_bits(actual[i].second->values(), maps[i], size)) << "output " << actual[i].first;
-  }
   std::vector<std::uint16_t> widths;
   for (const shared::Band& band : half(pass.band.bands, 0)) {
     widths.push_back(static_cast<std::uint16_t>(band.last - band.first + 1));
   }
-  EXPECT_TRUE(same_bits(outputs.search_width.values(), widths, size)) << "output search_width";
-  EXPECT_TRUE(same_bits(outputs.dynamic.values(), expected.dynamic, size)) << "output dynamic";
-  EXPECT_TRUE(same_bits(outputs.reason.values(), expected.reasons, size)) << "output reason";
+  const auto expect_map = [&](const char* name, const auto& map, const auto& values) {
+    EXPECT_TRUE(same_bits(map.values(), values, size)) << "output " << name;
+  };
+  expect_map("disparity", outputs.disparity, half(expected.output, 0));
+  expect_map("variance", outputs.variance, half(expected.output_variance, 0));
+  expect_map("right_disparity", outputs.right_disparity, half(expected.output, 1));
+  expect_map("right_variance", outputs.right_variance, half(expected.output_variance, 1));
+  expect_map("predicted", outputs.predicted, half(predicted.disparity, 0));
+  expect_map("predicted_variance", outputs.predicted_variance, half(masked(predicted).variance, 0));
+  expect_map("measured", outputs.measured, half(pass.measured.disparity, 0));
+  expect_map("measured_variance", outputs.measured_variance, half(masked(pass.measured).variance, 0));
+  expect_map("search_width", outputs.search_width, widths);
+  expect_map("dynamic", outputs.dynamic, expected.dynamic);
+  expect_map("reason", outputs.reason, expected.reasons);
   EXPECT_TRUE(outputs.padding_is_untouched());
 }
 

@@ -86,6 +86,27 @@ def needs_package(test, arguments):
         test.skipTest(f"no Python package beside the program, which has {arguments[0]}")
 
 
+def with_small_disk(folder, options):
+    """The start of a command that has a file system of these options at the folder. Skips the test where none can be mounted."""
+    start = ["unshare", "--map-root-user", "--mount", "sh", "-c", f"mount -t tmpfs -o {options} tmpfs '{folder}' && exec \"$@\"", "sh"]
+    if shutil.which("unshare") is None or subprocess.run([*start, "true"], capture_output=True).returncode:
+        raise unittest.SkipTest("no small file system can be mounted here")
+    return start
+
+
+def as_nobody(cache, **variables):
+    """How the program is run by a user who may write in nothing but the driver's cache. Skips the test where that cannot be."""
+    if os.geteuid():
+        raise unittest.SkipTest("rights are taken from another user: needs root")
+    shutil.chown(cache, "nobody")
+    options = {"user": "nobody", "env": dict(os.environ, POCL_CACHE_DIR=str(cache), HOME=str(cache), **variables)}
+    try:
+        egosgm("--version", **options)
+    except PermissionError:
+        raise unittest.SkipTest("another user cannot run the program where it lies") from None
+    return options
+
+
 def png(width, height, depth, rows, palette=b""):
     """A PNG of rows of bytes, grey, or of a palette."""
     def chunk(kind, body):

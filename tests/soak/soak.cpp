@@ -87,9 +87,7 @@ int soak(int frames, shared::ImageSize size, int disparities, const std::string&
   long early_kib = 0, early_files = 0;
   for (int frame = 0; frame < frames; ++frame) {
     stream.process(pipeline, frame, outputs);
-    for (const auto& [name, map] : outputs.maps()) checksum.add(map->values());
-    checksum.add(outputs.search_width.values());
-    checksum.add(outputs.dynamic.values());
+    outputs.for_each_map([&](const char*, auto map) { checksum.add((outputs.*map).values()); });
     if (frame == frames / 10) early_kib = resident_kib(), early_files = open_files();
   }
   const long grown_kib = resident_kib() - early_kib, grown_files = open_files() - early_files;

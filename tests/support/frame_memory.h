@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 #include <cstring>
-#include <string>
-#include <utility>
 #include <vector>
 
 #include "egosgm/pipeline.h"
@@ -100,23 +97,14 @@ class MapMemory {
 
 /// Memory for all that a frame can give.
 struct OutputMemory {
-  MapMemory<float> disparity, variance, right_disparity, right_variance, predicted, predicted_variance, measured,
-      measured_variance;
+  MapMemory<float> disparity, variance = disparity, right_disparity = disparity, right_variance = disparity,
+                              predicted = disparity, predicted_variance = disparity, measured = disparity,
+                              measured_variance = disparity;
   MapMemory<std::uint16_t> search_width;
-  MapMemory<std::uint8_t> dynamic, reason;
+  MapMemory<std::uint8_t> dynamic, reason = dynamic;
 
   explicit OutputMemory(shared::ImageSize size, Layout layout = {})
-      : disparity(size, layout),
-        variance(size, layout),
-        right_disparity(size, layout),
-        right_variance(size, layout),
-        predicted(size, layout),
-        predicted_variance(size, layout),
-        measured(size, layout),
-        measured_variance(size, layout),
-        search_width(size, layout),
-        dynamic(size, layout),
-        reason(size, layout) {}
+      : disparity(size, layout), search_width(size, layout), dynamic(size, layout) {}
 
   bool operator==(const OutputMemory&) const = default;
 
@@ -129,38 +117,37 @@ struct OutputMemory {
             {predicted.view(), predicted_variance.view(), measured.view(), measured_variance.view(),
              search_width.view(), dynamic.view()}};
   }
-  /// All that are of floats, by name.
-  std::vector<std::pair<std::string, const MapMemory<float>*>> maps() const {
-    return {{"disparity", &disparity},
-            {"variance", &variance},
-            {"right_disparity", &right_disparity},
-            {"right_variance", &right_variance},
-            {"predicted", &predicted},
-            {"predicted_variance", &predicted_variance},
-            {"measured", &measured},
-            {"measured_variance", &measured_variance}};
+  /// Calls `each` with the name of every map and the member that holds it.
+  template <typename Each>
+  static void for_each_map(const Each& each) {
+    each("disparity", &OutputMemory::disparity);
+    each("variance", &OutputMemory::variance);
+    each("right_disparity", &OutputMemory::right_disparity);
+    each("right_variance", &OutputMemory::right_variance);
+    each("predicted", &OutputMemory::predicted);
+    each("predicted_variance", &OutputMemory::predicted_variance);
+    each("measured", &OutputMemory::measured);
+    each("measured_variance", &OutputMemory::measured_variance);
+    each("search_width", &OutputMemory::search_width);
+    each("dynamic", &OutputMemory::dynamic);
+    each("reason", &OutputMemory::reason);
   }
   bool padding_is_untouched() const {
-    const auto all = maps();
-    return std::all_of(all.begin(), all.end(), [](const auto& map) { return map.second->padding_is_untouched(); }) &&
-           search_width.padding_is_untouched() && dynamic.padding_is_untouched() && reason.padding_is_untouched();
+    bool untouched = true;
+    for_each_map([&](const char*, auto map) { untouched = untouched && (this->*map).padding_is_untouched(); });
+    return untouched;
   }
 };
 
 /// Of two frames, bit by bit.
 inline ::testing::AssertionResult same_outputs(const OutputMemory& actual, const OutputMemory& expected,
                                                shared::ImageSize size) {
-  const auto actual_maps = actual.maps(), expected_maps = expected.maps();
-  for (std::size_t i = 0; i < actual_maps.size(); ++i) {
-    const auto same = same_bits(actual_maps[i].second->values(), expected_maps[i].second->values(), size);
-    if (!same) return ::testing::AssertionFailure() << actual_maps[i].first << ": " << same.message();
-  }
-  const auto same = same_bits(actual.search_width.values(), expected.search_width.values(), size);
-  if (!same) return ::testing::AssertionFailure() << "search_width: " << same.message();
-  const auto same_marks = same_bits(actual.dynamic.values(), expected.dynamic.values(), size);
-  if (!same_marks) return ::testing::AssertionFailure() << "dynamic: " << same_marks.message();
-  const auto same_reasons = same_bits(actual.reason.values(), expected.reason.values(), size);
-  return same_reasons ? same_reasons : ::testing::AssertionFailure() << "reason: " << same_reasons.message();
+  ::testing::AssertionResult result = ::testing::AssertionSuccess();
+  OutputMemory::for_each_map([&](const char* name, auto map) {
+    const auto same = same_bits((actual.*map).values(), (expected.*map).values(), size);
+    if (result && !same) result = ::testing::AssertionFailure() << name << ": " << same.message();
+  });
+  return result;
 }
 
 /// Of all frames of two runs.
