@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The method's constants, each with its unit, in the C that host and kernels compile. What may be chosen is an option
-// (include/egosgm/options.h). The CPU twins have numbers of their own (tests/reference/method.h).
+// (include/egosgm/options.h). The CPU references have numbers of their own (tests/reference/method.h).
 #ifndef EGOSGM_KERNELS_METHOD_H
 #define EGOSGM_KERNELS_METHOD_H
 

@@ -140,18 +140,18 @@ std::string in_pascal_case(const std::string& name) {
   return result;
 }
 
-TEST(House, EveryKernelHasItsHostItsTwinAndItsTest) {
+TEST(House, EveryKernelHasItsHostItsReferenceAndItsTest) {
   ASSERT_GE(kernels().size(), 10u);
   std::set<std::string> names;
   for (const fs::path& kernel : kernels()) {
     const std::string name = kernel.stem();
     EXPECT_TRUE(names.insert(name).second) << kernel << ": programs go by the names of their files";
-    // A second way to a stage's bits, or its last part, shares its twin and its test, which runs all of them.
+    // A second way to a stage's bits, or its last part, shares its reference and its test, which runs all of them.
     const std::string stage =
         name == "banded_sgm_paths" || name == "read_off" || name == "row_interpolation" ? "banded_sgm" : name;
-    const std::string host = "host/stages/" + name, twin = "tests/reference/" + stage;
+    const std::string host = "host/stages/" + name, reference = "tests/reference/" + stage;
     for (const std::string& file :
-         {host + ".h", host + ".cpp", twin + ".h", twin + ".cpp", "tests/stages/" + stage + "_test.cpp"}) {
+         {host + ".h", host + ".cpp", reference + ".h", reference + ".cpp", "tests/stages/" + stage + "_test.cpp"}) {
       EXPECT_TRUE(fs::exists(kSource / file)) << file;
     }
     // scripts/check asks for tests by this name.
@@ -160,7 +160,7 @@ TEST(House, EveryKernelHasItsHostItsTwinAndItsTest) {
   }
 }
 
-TEST(House, TwinsShareNothingWithTheKernelsButTheirLayouts) {
+TEST(House, ReferencesShareNothingWithTheKernelsButTheirLayouts) {
   const std::regex foreign(R"(#\s*include\s*"(host/(?!method_options\.h)|CL/|kernels/method))");
   for (const fs::path& file : files({".h", ".cpp"}, {"tests/reference"})) {
     EXPECT_FALSE(std::regex_search(text_of(file), foreign)) << file;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whole frames: every stage and output against its twin, one frame after the other or two at a time, and the truth.
+// Whole frames: every stage and output against its reference, one frame after the other or two at a time, and the
+// truth.
 #include "egosgm/pipeline.h"
 
 #include <gtest/gtest.h>
@@ -14,7 +15,7 @@
 namespace egosgm::testing {
 namespace {
 
-reference::Pipeline make_twin(const Setting& setting) {
+reference::Pipeline make_reference(const Setting& setting) {
   return {setting.size, setting.options, BandedSgm::code_padding(range_of(setting.options))};
 }
 
@@ -146,33 +147,33 @@ void expect_report(const FrameReport& report, const reference::Frame& expected, 
 
 class PipelineTest : public ::testing::TestWithParam<Setting> {};
 
-TEST_P(PipelineTest, EveryStageOfThreeFramesEqualsItsTwin) {
+TEST_P(PipelineTest, EveryStageOfThreeFramesEqualsItsReference) {
   const Setting& setting = GetParam();
   const Video video(setting);
   StageChain chain(video.calibration(), setting.size, setting.options, setting.type);
-  reference::Pipeline twin = make_twin(setting);
+  reference::Pipeline reference = make_reference(setting);
   for (int index = 0; index < video.size(); ++index) {
     SCOPED_TRACE("frame " + std::to_string(index));
     const ImageMemory left = video.image(index, EGOSGM_LEFT), right = video.image(index, EGOSGM_RIGHT);
     expect_same(chain.process(left.view(), right.view(), video.motion(index)),
-                twin.process(video.twin_images(index), video.twin_motions(index)), setting);
+                reference.process(video.reference_images(index), video.reference_motions(index)), setting);
   }
 }
 
 // Also over a frame without a motion, a reset, and a motion by which all that stands moves by itself.
-TEST_P(PipelineTest, EveryOutputOfAFrameEqualsItsTwin) {
+TEST_P(PipelineTest, EveryOutputOfAFrameEqualsItsReference) {
   const Setting& setting = GetParam();
   const Video video(setting, 7);
   Pipeline pipeline = make_pipeline(setting);
-  reference::Pipeline twin = make_twin(setting);
+  reference::Pipeline reference = make_reference(setting);
   for (int index = 0; index < video.size(); ++index) {
     SCOPED_TRACE("frame " + std::to_string(index));
-    if (index == 5) pipeline.reset(), twin.reset();
+    if (index == 5) pipeline.reset(), reference.reset();
     const bool has_motion = index != 3;
     Motion motion = video.motion(index);
     if (index == 6) motion.current_from_previous.translation().x() += 0.2;
-    const reference::Frame expected =
-        twin.process(video.twin_images(index), has_motion ? std::optional(video.twin_motions(motion)) : std::nullopt);
+    const reference::Frame expected = reference.process(
+        video.reference_images(index), has_motion ? std::optional(video.reference_motions(motion)) : std::nullopt);
     const Result actual = process(pipeline, setting, video, index, has_motion ? std::optional(motion) : std::nullopt);
     expect_outputs(actual.outputs, expected, setting.size);
     if (index == 6 && setting.options.temporal && setting.size.width == kSize.width) {
@@ -188,9 +189,9 @@ INSTANTIATE_TEST_SUITE_P(Settings, PipelineTest, ::testing::ValuesIn(settings())
 TEST(PipelineScene, ReachesEveryStage) {
   const Setting setting = standard();
   const Video video(setting, 2);
-  reference::Pipeline twin = make_twin(setting);
-  const reference::Frame first = twin.process(video.twin_images(0), {});
-  const reference::Frame second = twin.process(video.twin_images(1), video.twin_motions(1));
+  reference::Pipeline reference = make_reference(setting);
+  const reference::Frame first = reference.process(video.reference_images(0), {});
+  const reference::Frame second = reference.process(video.reference_images(1), video.reference_motions(1));
   ASSERT_EQ(first.passes.size(), 2u);
   EXPECT_NEAR(first.passes[0].offset.terms_px[0], setting.vertical_offset_px, 0.3);
   const auto differ = [](const HostMaps& a, const HostMaps& b) { return a.disparity != b.disparity; };
@@ -205,13 +206,13 @@ TEST(PipelineScene, ReachesEveryStage) {
   EXPECT_NE(second.output, second.result.disparity);
 }
 
-// The twin knows a pair again; so does the pipeline, over a reset too.
+// The reference knows a pair again; so does the pipeline, over a reset too.
 // Three poses are given for frame 1: the pictures are of the first one, from which frame 2 is predicted.
 TEST(Pipeline, KnowsARepeatedPairAgain) {
   const Setting setting = standard();
   const Video video(setting, 3);
   Pipeline pipeline = make_pipeline(setting);
-  reference::Pipeline twin = make_twin(setting);
+  reference::Pipeline reference = make_reference(setting);
   std::vector<float> densities;
   const Motion away = video.motion(1), farther = video.motion(2);
   Motion back = video.motion(2);
@@ -222,7 +223,7 @@ TEST(Pipeline, KnowsARepeatedPairAgain) {
                                             {1, away, Motion()},
                                             {1, farther, Motion()},
                                             {2, back, back * (farther * away)}}) {
-    const reference::Frame expected = twin.process(video.twin_images(index), video.twin_motions(moved));
+    const reference::Frame expected = reference.process(video.reference_images(index), video.reference_motions(moved));
     const Result actual = process(pipeline, setting, video, index, given);
     expect_outputs(actual.outputs, expected, setting.size);
     EXPECT_EQ(actual.report.repeated, densities.size() == 2 || densities.size() == 3);
@@ -231,25 +232,25 @@ TEST(Pipeline, KnowsARepeatedPairAgain) {
   EXPECT_NEAR(densities[2], densities[1], 0.01f);
   EXPECT_NEAR(densities[3], densities[1], 0.01f);
   EXPECT_GT(densities[4], densities[1] - 0.05f);
-  pipeline.reset(), twin.reset();
+  pipeline.reset(), reference.reset();
   const Result anew = process(pipeline, setting, video, 2);
-  expect_outputs(anew.outputs, twin.process(video.twin_images(2), video.twin_motions(2)), setting.size);
+  expect_outputs(anew.outputs, reference.process(video.reference_images(2), video.reference_motions(2)), setting.size);
   EXPECT_FALSE(anew.report.repeated);
   expect_outputs(process(pipeline, setting, video, 2, std::nullopt).outputs,
-                 twin.process(video.twin_images(2), std::nullopt), setting.size);
+                 reference.process(video.reference_images(2), std::nullopt), setting.size);
 }
 
 TEST(Pipeline, RecoversFromAWrongMotion) {
   const Setting setting = standard();
   const Video video(setting, 6);
   Pipeline pipeline = make_pipeline(setting), undisturbed = make_pipeline(setting);
-  reference::Pipeline twin = make_twin(setting);
+  reference::Pipeline reference = make_reference(setting);
   constexpr int kWrong = 2;
   for (int index = 0; index < video.size(); ++index) {
     SCOPED_TRACE("frame " + std::to_string(index));
     Motion motion = video.motion(index);
     if (index == kWrong) motion.current_from_previous.translation().z() -= 1;
-    const reference::Frame expected = twin.process(video.twin_images(index), video.twin_motions(motion));
+    const reference::Frame expected = reference.process(video.reference_images(index), video.reference_motions(motion));
     const Result actual = process(pipeline, setting, video, index, motion);
     const Result usual = process(undisturbed, setting, video, index);
     expect_outputs(actual.outputs, expected, setting.size);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Random codes, grey values and bands for BandedSgm, in both ways and in stripes, against the twin.
+// Random codes, grey values and bands for BandedSgm, in both ways and in stripes, against the reference.
 #include <memory>
 
 #include "host/stages/banded_sgm.h"

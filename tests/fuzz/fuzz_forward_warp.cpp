@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Random maps, calibrations and motions, also degenerate ones, for ForwardWarp in both ways, against the twin.
+// Random maps, calibrations and motions, also degenerate ones, for ForwardWarp in both ways, against the reference.
 #include <stdexcept>
 
 #include "host/stages/forward_warp.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The method's constants as the twins know them: numbers of their own, so that a wrong one of the kernels shows.
+// The method's constants as the references know them: numbers of their own, so that a wrong one of the kernels shows.
 #pragma once
 
 namespace egosgm::reference {

@@ -55,7 +55,7 @@ struct Frame {
   float vertical_offset_px = 0;        // that the last pass was resampled by in the middle
 };
 
-/// The twins of the stages, in the order of host/frame/pipeline.cpp.
+/// The references of the stages, in the order of host/frame/pipeline.cpp.
 class Pipeline {
  public:
   /// `code_padding`: of the rows of `Pass::codes`.

@@ -81,7 +81,7 @@ testing::HostMaps predictions(const Case& c) {
   return maps;
 }
 
-/// What a match is given and what it gives, by the twin's layout.
+/// What a match is given and what it gives, by the reference's layout.
 struct Match {
   std::vector<std::uint64_t> codes[2];
   std::vector<std::uint16_t> grey;
@@ -164,7 +164,7 @@ std::vector<T> rows_of(const std::vector<T>& values, int planes, shared::ImageSi
   return taken;
 }
 
-/// The rows that are kept of what the twin makes of each stripe, as if it were the image.
+/// The rows that are kept of what the reference makes of each stripe, as if it were the image.
 testing::HostMaps stripe_by_stripe(const Match& m, shared::ImageSize size) {
   testing::HostMaps expected = m.measured;
   for (const Stripe& stripe : m.stripes) {
@@ -193,7 +193,7 @@ void expect_few_rows(const std::vector<Stripe>& stripes, int height) {
   EXPECT_LE(rows, height + static_cast<int>(stripes.size()) * (2 * BandedSgm::kStripeOverlap + 1));
 }
 
-TEST(BandedSgmStripes, EqualTheTwinOfEach) {
+TEST(BandedSgmStripes, EqualTheReferenceOfEach) {
   for (const Scheduling scheduling : {Scheduling::kWavefront, Scheduling::kPaths}) {
     for (const MatchingCost cost : {MatchingCost::kCensus5x5, MatchingCost::kSad3x3}) {
       const bool reads_off = cost == MatchingCost::kSad3x3;

@@ -44,8 +44,8 @@ std::vector<cl_uchar> marks_of(shared::ImageSize size, const View& last, const V
   return marks.read(context);
 }
 
-std::vector<std::uint8_t> twin_marks(shared::ImageSize size, const View& last, const View& current,
-                                     const Motion& motion) {
+std::vector<std::uint8_t> reference_marks(shared::ImageSize size, const View& last, const View& current,
+                                          const Motion& motion) {
   Motion back;
   back.current_from_previous = motion.current_from_previous.inverse();
   return reference::dynamic_map(size, last, current, disparity_motion(kCalibration, back, EGOSGM_LEFT));
@@ -84,7 +84,7 @@ View scene(int dx, int dy, float near_px, int noise, unsigned seed) {
 /// Parts of the object's pixels and of the others that are marked.
 std::pair<double, double> parts_marked(const View& last, const View& current, int dx, int dy) {
   const std::vector<cl_uchar> marks = marks_of(kSize, last, current, Motion());
-  EXPECT_TRUE(testing::same_bits(marks, twin_marks(kSize, last, current, Motion()), kSize));
+  EXPECT_TRUE(testing::same_bits(marks, reference_marks(kSize, last, current, Motion()), kSize));
   int counts[2] = {}, marked[2] = {};
   for (int y = 0; y < kSize.height; ++y) {
     for (int x = 0; x < kSize.width; ++x) {
@@ -117,7 +117,7 @@ TEST_P(DynamicMapTest, EqualsReference) {
       views[i].disparity = std::move(both);
     }
     for (const Motion& motion : {Motion(), ahead(0.4)}) {
-      const std::vector<std::uint8_t> expected = twin_marks(size, views[0], views[1], motion);
+      const std::vector<std::uint8_t> expected = reference_marks(size, views[0], views[1], motion);
       if (size.width > 300) {
         EXPECT_GT(std::count(expected.begin(), expected.end(), 255), 500) << "it compares something";
       }

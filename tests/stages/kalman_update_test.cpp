@@ -80,8 +80,8 @@ TEST_P(KalmanUpdateTest, EqualsReference) {
   for (const KalmanUpdateOptions& options :
        {KalmanUpdateOptions{}, KalmanUpdateOptions{.ask_neighbours = false},
         KalmanUpdateOptions{.gate_px = 0, .keep_predicted = false, .min_variance_px2 = 0.5f}}) {
-    const testing::HostMaps twin = reference::kalman_update(size, options, predicted, measured);
-    const testing::HostMaps expected{twin.disparity, twin.variance, {}, twin.doubtful};
+    const testing::HostMaps reference = reference::kalman_update(size, options, predicted, measured);
+    const testing::HostMaps expected{reference.disparity, reference.variance, {}, reference.doubtful};
     for (const int pixels : {1, 16}) {
       const testing::HostMaps actual = update(size, options, predicted, measured, pixels);
       EXPECT_TRUE(testing::same_maps(actual, expected, size)) << "gate " << options.gate_px << ", by " << pixels;

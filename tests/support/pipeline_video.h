@@ -146,15 +146,15 @@ class Video {
   Motion motion(int index) const {
     return index % 2 == 0 ? with_covariance(scene_.motion(index)) : scene_.motion(index);
   }
-  reference::Images twin_images(int index) const {
+  reference::Images reference_images(int index) const {
     reference::Images images{pairs_[index].greys, setting_.type == PixelType::kU8 ? 8 : 16};
     if (images.bits == 8) {
       for (int& grey : images.greys) grey >>= 8;
     }
     return images;
   }
-  reference::ViewMotions twin_motions(int index) const { return twin_motions(motion(index)); }
-  reference::ViewMotions twin_motions(Motion scaled) const {
+  reference::ViewMotions reference_motions(int index) const { return reference_motions(motion(index)); }
+  reference::ViewMotions reference_motions(Motion scaled) const {
     scaled.covariance *= static_cast<double>(setting_.options.forward_warp.motion_noise);
     Motion back;
     back.current_from_previous = scaled.current_from_previous.inverse();

@@ -13,9 +13,9 @@
 
 namespace egosgm::testing {
 
-/// Disparity and variance of both views, as the twins take them. Of a prediction, `hidden` is 1 where a surface nearer
-/// than the range hides what is behind; of an update, `doubtful` as on the device. Empty: all 0.
-/// `evidence`: of a belief, or what moved with it.
+/// Disparity and variance of both views, as the references take them. Of a prediction, `hidden` is 1 where a surface
+/// nearer than the range hides what is behind; of an update, `doubtful` as on the device. Empty: all 0. `evidence`: of
+/// a belief, or what moved with it.
 struct HostMaps {
   std::vector<float> disparity, variance;
   std::vector<std::uint8_t> hidden = {}, doubtful = {}, evidence = {};
