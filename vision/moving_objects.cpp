@@ -29,6 +29,7 @@ constexpr double kMinFlow_px = 1;                        // that its motion make
 constexpr double kMinContradiction = 14;                 // of the camera's motion: squared, in standard deviations
 constexpr double kMinShare = 0.4;                        // of its points that agree with its motion
 constexpr double kMinKnownGain = 0.67, kMinNewGain = 1;  // in the mean of its label
+constexpr double kMaxNewCost = 2.2;                      // of its own motion, in that mean
 constexpr double kMaxVelocity_m = 3.5;
 constexpr double kSteadyShare = 0.5, kSteady_m = 0.02;  // by which its velocity may differ from that before
 constexpr double kSameFlow_px = 1.5;                    // two that differ by less are one object
@@ -86,6 +87,7 @@ struct Candidate {
   Box box{};          // where its label may reach
   BoxValues gains{};  // 0: not its label's
   Group label{};
+  double cost = 0;  // of its motion, in the mean of its label
 
   bool is_new() const { return track.id == 0; }
 };
@@ -332,6 +334,15 @@ bool ObjectTracker::State::label(Candidate& candidate) const {
       }
     }
   }
+  double cost = 0;
+  int asked = 0;
+  for (const Pixel& p : candidate.label.pixels) {
+    const float each = by_own[box.index(p.x, p.y)];
+    if (std::isnan(each)) continue;
+    cost += each;
+    ++asked;
+  }
+  candidate.cost = cost / std::max(asked, 1);
   return candidate.label.size() >= kMinPixels;
 }
 
@@ -368,7 +379,8 @@ bool ObjectTracker::State::moves(const Candidate& candidate) const {
   double gain = 0;
   for (const float each : candidate.gains) gain += each;
   return gain >= (candidate.is_new() ? kMinNewGain : kMinKnownGain) * candidate.label.size() &&
-         candidate.fit.share >= kMinShare && flow_apart(candidate.label, candidate.back, camera_back) >= kMinFlow_px &&
+         !(candidate.is_new() && candidate.cost > kMaxNewCost) && candidate.fit.share >= kMinShare &&
+         flow_apart(candidate.label, candidate.back, camera_back) >= kMinFlow_px &&
          contradiction(candidate.label, candidate.back) >= kMinContradiction;
 }
 
