@@ -5,6 +5,7 @@
 #ifndef EGOSGM_KERNELS_PIXELS_H
 #define EGOSGM_KERNELS_PIXELS_H
 
+#include "compiler.h"
 #include "shared.h"
 
 #ifndef PIXELS
@@ -44,6 +45,13 @@ typedef uint16 Uints;
 // Block `i` of the chunk, which begins at column x.
 #define FOR_BLOCKS(x, i, start, width) for (int i = 0, x = start; i < CHUNK && x < (width); ++i, x += PIXELS)
 
+// In place of a row's width, in a copy of the code for blocks that lie within the row together with all that they read
+// beside them: loads and stores then ask nothing, and the compiler keeps values in registers.
+#define EVERYWHERE INT_MAX
+static inline int is_within(const int x, const int reach, const int width) {
+  return PIXELS > 1 && x >= reach && x + PIXELS + reach <= width;
+}
+
 #define INVALID ((Floats)(EGOSGM_INVALID_DISPARITY))
 
 // A condition as a number; and whether one holds in any pixel, for work that most blocks need not do. any() asks lane
@@ -79,9 +87,11 @@ static inline Floats gather(volatile global const float* row, const Ints* places
   return GATHERED(Floats, row, *places);
 }
 
-#if PIXELS > 1
 // A block where its row begins or ends. Not inlined: inlined at every load and store, it would be most of
 // what is compiled. Without a branch a lane: a row has few blocks.
+#if PIXELS == 1
+#define AT_EDGE static inline
+#else
 #define AT_EDGE static __attribute__((noinline, cold))
 AT_EDGE Floats load_pixels_at_edge(global const float* row, const int x, const int width) {
   const Ints at = x + LANE_INDICES, inside = clamp(at, (Ints)(0), (Ints)(width - 1));
@@ -119,11 +129,11 @@ AT_EDGE void store_words_at_edge(Ints words, global int* to, const int count) { 
 #endif
 
 // Pixels x .. x + PIXELS - 1 of a row; what lies outside of it is invalid.
-static inline Floats load_pixels(global const float* row, const int x, const int width) {
+ALWAYS_INLINE Floats load_pixels(global const float* row, const int x, const int width) {
 #if PIXELS == 1
   return x >= 0 && x < width ? row[x] : EGOSGM_INVALID_DISPARITY;
 #else
-  return x >= 0 && x + PIXELS <= width ? vload16(0, row + x) : load_pixels_at_edge(row, x, width);
+  return width == EVERYWHERE || is_within(x, 0, width) ? vload16(0, row + x) : load_pixels_at_edge(row, x, width);
 #endif
 }
 
@@ -150,11 +160,11 @@ typedef struct __attribute__((packed)) {
 
 // Writes pixels x .. x + PIXELS - 1, as far as the row goes. REQUIRES: x lies in it. Not by vstore16, which some
 // compilers (PoCL 3.1) take to four pieces.
-static inline void store_pixels(const Floats pixels, global float* row, const int x, const int width) {
+ALWAYS_INLINE void store_pixels(const Floats pixels, global float* row, const int x, const int width) {
 #if PIXELS == 1
   row[x] = pixels;
 #else
-  if (x + PIXELS <= width) {
+  if (width == EVERYWHERE || x + PIXELS <= width) {
     ((global PackedFloats*)(row + x))->lanes = pixels;
   } else {
     store_pixels_at_edge(pixels, row + x, width - x);
@@ -177,11 +187,11 @@ static inline Ints load_bytes(global const uchar* row, const int x, const int wi
 }
 
 // Writes bytes. REQUIRES: values from 0 to 255; x lies in the row.
-static inline void store_bytes(const Ints values, global uchar* row, const int x, const int width) {
+ALWAYS_INLINE void store_bytes(const Ints values, global uchar* row, const int x, const int width) {
 #if PIXELS == 1
   row[x] = (uchar)values;
 #else
-  if (x + PIXELS <= width) {
+  if (width == EVERYWHERE || x + PIXELS <= width) {
     ((global PackedBytes*)(row + x))->lanes = convert_uchar16(values);
   } else {
     store_bytes_at_edge(convert_uchar16(values), row + x, width - x);
@@ -208,7 +218,7 @@ static inline void store_words(const Ints words, global uchar* row, const int x,
 #if PIXELS == 1
   ((global int*)row)[x] = words;
 #else
-  if (x + PIXELS <= width) {
+  if (width == EVERYWHERE || x + PIXELS <= width) {
     ((global PackedInts*)(row + 4 * x))->lanes = words;
   } else {
     store_words_at_edge(words, (global int*)row + x, width - x);
