@@ -81,26 +81,27 @@ std::optional<VideoArguments> SequenceArguments::videos() const {
   throw InvalidArgument("more than one input: " + named.left + " and " + others.text() + ": give one of them");
 }
 
-vision::StereoSequence SequenceArguments::open(bool needs_calibration, const CalibrationReader& read) const {
+std::optional<SequenceArguments> SequenceArguments::as_patterns() const {
+  SequenceArguments patterns = *this;
   if (!other_picture.empty()) {
     if (!is_image(folder) || !left.empty() || !right.empty()) {
       throw InvalidArgument("more than one input: " + folder + " and " + other_picture +
                             ": give one folder, or the left and the right picture of a pair");
     }
-    SequenceArguments pair = *this;
-    pair.left = std::exchange(pair.folder, "");
-    pair.right = std::exchange(pair.other_picture, "");
-    return pair.open(needs_calibration, read);
+    patterns.left = std::exchange(patterns.folder, "");
+    patterns.right = std::exchange(patterns.other_picture, "");
+    return patterns;
   }
-  if (!folder.empty() && left.empty() && right.empty() && !calib.empty()) {
-    if (const auto cameras = vision::find_two_cameras(folder); cameras && cameras->calibration.empty()) {
-      SequenceArguments pairs = *this;
-      pairs.folder.clear();
-      pairs.left = cameras->left, pairs.right = cameras->right;
-      return pairs.open(needs_calibration, read);
-    }
-  }
-  const bool patterns = !left.empty() || !right.empty() || !calib.empty();
+  if (folder.empty() || !left.empty() || !right.empty() || calib.empty()) return std::nullopt;
+  const auto cameras = vision::find_two_cameras(folder);
+  if (!cameras || !cameras->calibration.empty()) return std::nullopt;
+  patterns.folder.clear();
+  patterns.left = cameras->left, patterns.right = cameras->right;
+  return patterns;
+}
+
+void SequenceArguments::expect_one_input(bool needs_calibration) const {
+  const bool patterns = has_patterns();
   std::vector<std::string> sources;
   if (!kitti.empty()) sources.push_back("--kitti " + kitti);
   if (!odometry.empty()) sources.push_back("--odometry " + odometry);
@@ -124,15 +125,18 @@ vision::StereoSequence SequenceArguments::open(bool needs_calibration, const Cal
   if (!pair_by.empty() && !patterns) {
     throw InvalidArgument("--pair-by " + pair_by + ": is for --left and --right; in a folder names tell");
   }
+}
+
+vision::StereoSequence SequenceArguments::open(bool needs_calibration, const CalibrationReader& read) const {
+  if (const auto patterns = as_patterns()) return patterns->open(needs_calibration, read);
+  expect_one_input(needs_calibration);
   const vision::FrameRange range = frames.empty() ? vision::FrameRange{} : vision::parse_frame_range(frames);
   if (!kitti.empty()) return vision::open_kitti_multiview(kitti, scene, range);
   if (!odometry.empty()) return vision::open_kitti_odometry(odometry, range);
-  if (!folder.empty()) {
-    vision::StereoSequence sequence = vision::open_folder(folder, range);
-    if (sequence.has_calibration || !needs_calibration) return sequence;
-    throw InvalidArgument(folder + ": holds no calibration: put calib.txt there, or give --calib FILE");
-  }
-  return open_pictures(range, read);
+  if (has_patterns()) return open_pictures(range, read);
+  vision::StereoSequence sequence = vision::open_folder(folder, range);
+  if (sequence.has_calibration || !needs_calibration) return sequence;
+  throw InvalidArgument(folder + ": holds no calibration: put calib.txt there, or give --calib FILE");
 }
 
 vision::StereoSequence SequenceArguments::open_pictures(const vision::FrameRange& range,

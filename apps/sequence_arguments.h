@@ -36,6 +36,12 @@ struct SequenceArguments {
   std::string text() const;
 
  private:
+  bool has_patterns() const { return !left.empty() || !right.empty() || !calib.empty(); }
+  /// The two pictures, or the two cameras' folders that lie in `folder`, as --left and --right; none where there are
+  /// none.
+  std::optional<SequenceArguments> as_patterns() const;
+  /// Throws InvalidArgument unless the options that are given belong together and name one sequence.
+  void expect_one_input(bool needs_calibration) const;
   vision::StereoSequence open_pictures(const vision::FrameRange& range, const CalibrationReader& read) const;
 };
 

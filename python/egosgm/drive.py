@@ -22,6 +22,21 @@ def any_calibration(width: int, height: int) -> _egosgm.Calibration:
     return _egosgm.Calibration(width, width, width / 2, height / 2, 1)
 
 
+_KINDS: Dict[str, Tuple[Any, str]] = {
+    "frames": (str, 'give text, such as "7:10"'),
+    "motion": ((int, np.bool_), "choose True or False; Pipeline.process takes motions that are known"),
+    "objects": ((int, np.bool_), "choose True or False"),
+    "outputs": (Iterable, 'give names of maps, such as ("disparity", "variance")'),
+    "odometry": ((dict, type(None)), "give a dict of StereoOdometry's options")}
+
+
+def _expect_kinds(**given: Any) -> None:
+    for name, value in given.items():
+        kinds, choice = _KINDS[name]
+        if not isinstance(value, kinds):
+            raise _egosgm.InvalidArgument(f"{name}: is a {type(value).__name__}: {choice}")
+
+
 @dataclasses.dataclass(frozen=True, repr=False, eq=False)
 class VideoFrame:
     """A frame of a drive: images, maps and what happened."""
@@ -83,13 +98,7 @@ class StereoVideo:
                  calibration: "_egosgm.Calibration | str | os.PathLike[str] | None" = None, *, frames: str = "", motion: bool = True,
                  outputs: Union[str, Sequence[str]] = ("disparity", "variance"), odometry: Optional[Dict[str, Any]] = None, lag: int = 1,
                  progress: Optional[bool] = None, objects: bool = False, **options: Any) -> None:
-        for name, value, kinds, choice in (("frames", frames, str, 'give text, such as "7:10"'),
-                                           ("motion", motion, (int, np.bool_), "choose True or False; Pipeline.process takes motions that are known"),
-                                           ("objects", objects, (int, np.bool_), "choose True or False"),
-                                           ("outputs", outputs, Iterable, 'give names of maps, such as ("disparity", "variance")'),
-                                           ("odometry", odometry, (dict, type(None)), "give a dict of StereoOdometry's options")):
-            if not isinstance(value, kinds):  # type: ignore[arg-type]
-                raise _egosgm.InvalidArgument(f"{name}: is a {type(value).__name__}: {choice}")
+        _expect_kinds(frames=frames, motion=motion, objects=objects, outputs=outputs, odometry=odometry)
         if isinstance(source, (str, os.PathLike)):
             source = _egosgm.open_folder(source, frames)
         elif frames:
@@ -97,31 +106,13 @@ class StereoVideo:
         if not hasattr(source, "__iter__") and not isinstance(source, (_egosgm.StereoSequence, Bag)):
             raise _egosgm.InvalidArgument(f"source: is a {type(source).__name__}: give a folder, a sequence, a bag, or pairs of images")
         self.sequence = source if isinstance(source, _egosgm.StereoSequence) else None
-        if calibration is None and self.sequence is not None:
-            _egosgm._expect_calibrated(self.sequence)
-            calibration = self.sequence.calibration
-        if isinstance(source, Bag):
-            if calibration is not None:
-                raise _egosgm.InvalidArgument("calibration: a bag has its own: give it to the Bag, as calib")
-            calibration = source.find_cameras().calibration
         self._calibration_file: "str | os.PathLike[str]" = ""
-        if isinstance(calibration, (str, os.PathLike)):
-            self._calibration_file = calibration if self.sequence is None else ""
-            calibration = read_calibration(calibration, size=self.sequence.size if self.sequence is not None else None)
-        if isinstance(calibration, StereoRig):
-            raise _egosgm.InvalidArgument("calibration: is of raw images: rectify them first (egosgm.Rectification, egosgm rectify)")
-        if calibration is not None and not isinstance(calibration, _egosgm.Calibration):
-            raise _egosgm.InvalidArgument(f"calibration: is a {type(calibration).__name__}: give an egosgm.Calibration; read_calibration reads a file")
-        self.calibration = calibration
+        self.calibration = self._calibration_from(source, calibration)
         if not isinstance(lag, (int, np.integer)) or lag not in (0, 1):
             raise _egosgm.InvalidArgument(f"lag={lag!r}: choose 1, the device works while the next pair comes, or 0, a frame comes before the next pair is asked for")
         self._source, self._outputs, self._lag, self._options = source, outputs, int(lag), options
         self._bar = _bar(progress)
-        self._odometry_options = (odometry or {}) if motion and calibration is not None else None
-        if odometry and self._odometry_options is None:
-            raise _egosgm.InvalidArgument("odometry: has options, but without a calibration, or with motion=False, there is none: leave them out")
-        if objects and self._odometry_options is None:
-            raise _egosgm.InvalidArgument("objects=True: what moves by itself is told from the camera's motion: give a calibration, and leave motion=False out")
+        self._odometry_options = self._odometry_from(odometry, motion, objects)
         self._objects = bool(objects)
         if self._objects:  # the tracker needs these maps
             self._outputs = tuple(dict.fromkeys((*((outputs,) if isinstance(outputs, str) else outputs), "disparity", "dynamic")))
@@ -131,6 +122,34 @@ class StereoVideo:
             _egosgm.StereoOdometry(self.calibration, **self._odometry_options)
         self._size = self.sequence.size if self.sequence is not None else None
         self._spare = [self._pipeline(*self._size)] if self._size else []  # pipelines for the next iterations
+
+    def _calibration_from(self, source: Any, given: Any) -> Optional[_egosgm.Calibration]:
+        """What is given, read where it is a file, or the source's own."""
+        if given is None and self.sequence is not None:
+            _egosgm._expect_calibrated(self.sequence)
+            given = self.sequence.calibration
+        if isinstance(source, Bag):
+            if given is not None:
+                raise _egosgm.InvalidArgument("calibration: a bag has its own: give it to the Bag, as calib")
+            given = source.find_cameras().calibration
+        if isinstance(given, (str, os.PathLike)):
+            self._calibration_file = given if self.sequence is None else ""
+            given = read_calibration(given, size=self.sequence.size if self.sequence is not None else None)
+        if isinstance(given, StereoRig):
+            raise _egosgm.InvalidArgument("calibration: is of raw images: rectify them first (egosgm.Rectification, egosgm rectify)")
+        if given is not None and not isinstance(given, _egosgm.Calibration):
+            raise _egosgm.InvalidArgument(f"calibration: is a {type(given).__name__}: give an egosgm.Calibration; read_calibration reads a file")
+        return given
+
+    def _odometry_from(self, given: Optional[Dict[str, Any]], motion: bool, objects: bool) -> Optional[Dict[str, Any]]:
+        """Its options. None: there is no odometry."""
+        if motion and self.calibration is not None:
+            return given or {}
+        if given:
+            raise _egosgm.InvalidArgument("odometry: has options, but without a calibration, or with motion=False, there is none: leave them out")
+        if objects:
+            raise _egosgm.InvalidArgument("objects=True: what moves by itself is told from the camera's motion: give a calibration, and leave motion=False out")
+        return None
 
     def __len__(self) -> int:
         return len(self._source)
@@ -191,14 +210,7 @@ class StereoVideo:
                                    **(self._odometry_options or {}))
             tracker = _egosgm.ObjectTracker(self.calibration) if self._objects else None
             while True:
-                while video.wants_pair:
-                    try:
-                        video.add(*next(pairs))
-                    except StopIteration:
-                        video.end()
-                    except Exception as error:  # what is under way does not suffer from a next pair that is none
-                        failure = error
-                        video.end()
+                failure = failure or _feed(video, pairs)
                 found = video.next()
                 if found is None:
                     break
@@ -220,6 +232,19 @@ class StereoVideo:
             if pipeline:
                 pipeline.reset()
                 self._spare = [pipeline]
+
+
+def _feed(video: Any, pairs: Iterator[Tuple[Any, ...]]) -> Optional[Exception]:
+    """Gives the video all pairs that it wants now. What is under way does not suffer from a next pair that is none: its error is returned."""
+    while video.wants_pair:
+        try:
+            video.add(*next(pairs))
+        except StopIteration:
+            video.end()
+        except Exception as error:
+            video.end()
+            return error
+    return None
 
 
 def _bar(progress: Optional[bool]):
