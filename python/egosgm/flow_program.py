@@ -155,6 +155,26 @@ def _text_of(frames: int, regions: Dict[str, Any], notes: List[str]) -> str:
     return "\n".join(lines + notes)
 
 
+def _pairs_of(estimate: _Path, truth: _Path, frames: Any) -> Tuple[List[Dict[str, Any]], List[Any]]:
+    """The files of each kind of map by their names, and the truth files without an estimate."""
+    pairs = []
+    for names in _FOLDERS:
+        place = _place(estimate, names)
+        run = frames_of_run(place)
+        found, missing, _ = _egosgm._pair_with_truth(place, _place(truth, names), text_argument(frames), run.images if run else {})
+        pairs.append({pair.name: pair for pair in found})
+    return pairs, missing
+
+
+def _maps_of(files: List[Any], true_objects: Optional[np.ndarray]) -> List[List[np.ndarray]]:
+    """A frame's estimates and its truths, all of one size."""
+    maps = [[reader(getattr(pair, side)) for pair, reader in zip(files, (_read, _read, read_flow))] for side in ("estimate", "truth")]
+    sizes = {array.shape[:2] for array in (*maps[0], *maps[1], *([] if true_objects is None else [true_objects]))}
+    if len(sizes) > 1:
+        raise _egosgm.InvalidArgument(f"{files[-1].estimate}: maps of this frame differ in size: {', '.join(f'{w}x{h}' for h, w in sorted(sizes))}; give maps of one size")
+    return maps
+
+
 def _work(arguments: Sequence[str]) -> str:
     parser = comparison_parser("eval-flow", __doc__, "folder with disp_0 (or disparity), disp_1 and flow: KITTI's PNG, or PFM, .npy and .flo",
                                "folder with such ones, or KITTI 2015's disp_occ_0, disp_occ_1, flow_occ; with objects or obj_map, what moves counts apart; or "
@@ -165,29 +185,18 @@ def _work(arguments: Sequence[str]) -> str:
     resolve_comparison(given)
     estimate, truth = _Path(given.estimate), _Path(given.truth)
     truth = truth / "truth" if (truth / "truth").is_dir() else truth
-    pairs, notes, moving = [], [], _place(truth, _MOVING, needed=False)
-    for names in _FOLDERS:
-        place = _place(estimate, names)
-        run = frames_of_run(place)
-        found, missing, _ = _egosgm._pair_with_truth(place, _place(truth, names), text_argument(given.frames), run.images if run else {})
-        pairs.append({pair.name: pair for pair in found})
-    if missing:
-        notes.append(f"{counted(len(missing), 'truth file')} without an estimate, the first is {missing[0]}")
+    pairs, missing = _pairs_of(estimate, truth, given.frames)
+    notes = [f"{counted(len(missing), 'truth file')} without an estimate, the first is {missing[0]}"] if missing else []
     total: Dict[str, np.ndarray] = {}
     over_frames = []
-    labels = _place(estimate, ("objects",), needed=False)
+    labels, moving = (_place(folder, names, needed=False) for folder, names in ((estimate, ("objects",)), (truth, _MOVING)))
     objects = _Objects(estimate, truth) if labels != _Path() and moving != _Path() else None
     for name, flow in pairs[2].items():
         if any(name not in of_kind for of_kind in pairs):
             raise _egosgm.InvalidArgument(f"{flow.estimate}: its frame has no disparity, or none in the next frame: give one of each")
-        files = [of_kind[name] for of_kind in pairs]
-        maps = [[reader(getattr(pair, side)) for pair, reader in zip(files, (_read, _read, read_flow))] for side in ("estimate", "truth")]
         true_objects = None if moving == _Path() else _egosgm.read_grey(moving / flow.truth.with_suffix(".png").name)
-        mask = None if true_objects is None else true_objects != 0
-        sizes = {array.shape[:2] for array in (*maps[0], *maps[1], *([] if mask is None else [mask]))}
-        if len(sizes) > 1:
-            raise _egosgm.InvalidArgument(f"{flow.estimate}: maps of this frame differ in size: {', '.join(f'{w}x{h}' for h, w in sorted(sizes))}; give maps of one size")
-        counts = count_outliers(*maps, mask)
+        maps = _maps_of([of_kind[name] for of_kind in pairs], true_objects)
+        counts = count_outliers(*maps, None if true_objects is None else true_objects != 0)
         if objects and true_objects is not None:
             own = _egosgm.read_grey(labels / flow.estimate.with_suffix(".png").name)
             if own.shape != true_objects.shape:
