@@ -33,12 +33,13 @@ from .drive import StereoVideo, VideoFrame, run
 from .diagnostics.examination import match_pair
 from .matcher import Matcher
 from .geometry.points import PointCloud, point_cloud, write_ply
+from .evaluation.flow_evaluation import ObjectCounts, OutlierFigures, SceneFlowEvaluation, SceneFlowFigures, evaluate_scene_flow
 from .evaluation.pose_evaluation import MotionError, PoseEvaluation, SegmentError, evaluate_poses
 from .calibration.rectification import Rectification, StereoRig
 from .values import as_dataclass as _as_dataclass
 from .evaluation.video_evaluation import DensityFigures, RegionFigures, VideoEvaluation, VideoFigures, evaluate_video, move_map
 
-__all__ = ["__version__", "read_calibration", "read_euroc_rig", "read_opencv_rig", "depth_sigma_from_disparity", "Rectification", "StereoRig", "StereoVideo", "VideoFrame", "match_pair", "Matcher", "run", "PointCloud", "point_cloud", "write_ply", "MotionError", "PoseEvaluation", "SegmentError", "evaluate_poses", "DensityFigures", "RegionFigures", "VideoEvaluation", "VideoFigures", "evaluate_video", "move_map",
+__all__ = ["__version__", "read_calibration", "read_euroc_rig", "read_opencv_rig", "depth_sigma_from_disparity", "Rectification", "StereoRig", "StereoVideo", "VideoFrame", "match_pair", "Matcher", "run", "PointCloud", "point_cloud", "write_ply", "ObjectCounts", "OutlierFigures", "SceneFlowEvaluation", "SceneFlowFigures", "evaluate_scene_flow", "MotionError", "PoseEvaluation", "SegmentError", "evaluate_poses", "DensityFigures", "RegionFigures", "VideoEvaluation", "VideoFigures", "evaluate_video", "move_map",
            *(name for name in dir(_egosgm) if not name.startswith("_"))]
 
 

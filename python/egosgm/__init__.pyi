@@ -21,6 +21,11 @@ from .matcher import Matcher as Matcher
 from .geometry.points import PointCloud as PointCloud
 from .geometry.points import point_cloud as point_cloud
 from .geometry.points import write_ply as write_ply
+from .evaluation.flow_evaluation import ObjectCounts as ObjectCounts
+from .evaluation.flow_evaluation import OutlierFigures as OutlierFigures
+from .evaluation.flow_evaluation import SceneFlowEvaluation as SceneFlowEvaluation
+from .evaluation.flow_evaluation import SceneFlowFigures as SceneFlowFigures
+from .evaluation.flow_evaluation import evaluate_scene_flow as evaluate_scene_flow
 from .evaluation.pose_evaluation import MotionError as MotionError
 from .evaluation.pose_evaluation import PoseEvaluation as PoseEvaluation
 from .evaluation.pose_evaluation import SegmentError as SegmentError

@@ -3,6 +3,7 @@
 frame's pixels (D2), of the optical flow to the next frame (Fl), and of any of them (SF). Where both sides label objects that move by themselves: which of
 them were found, and how far their motions are off."""
 import csv
+import dataclasses
 import pathlib
 from typing import Any, Dict, List, Optional, Sequence, Tuple
 
@@ -11,51 +12,13 @@ import numpy as np
 from . import _egosgm
 from .arguments import comparison_parser, counted, json_text, resolve_comparison, tell, text_argument
 from .run_folder import frames_of_run
-from .evaluation.video_evaluation import BAD_PX, is_sky, percent
+from .evaluation.flow_evaluation import MEASURES, SceneFlowFigures, count_outliers, evaluation_of, match_objects
 from .video_program import read_flow
 
 _Path = pathlib.Path
-MEASURES = ("d1", "d2", "fl", "sf")
-BAD_SHARE = 0.05  # an outlier is off by more than BAD_PX, and by more than this share of the truth
 _FOLDERS = (("disp_0", "interpolated", "disparity", "left_disp_occ", "disp_occ_0"), ("disp_1", "disp_occ_1"), ("flow", "flow_occ"))  # of D1, D2, Fl: the first that is there
 _MOVING = ("objects", "obj_map")
-
-
-def count_outliers(estimates: Sequence[np.ndarray], truths: Sequence[np.ndarray], moving: Any = None) -> Dict[str, np.ndarray]:
-    """For each region a row for each measure: outliers, pixels with truth, pixels with truth and estimate. Of estimates and truths: the disparity, that in the
-    next frame and the flow, H x W x 1 or 2, NaN where there is none. moving: what moves by itself; without it, there is the region `all` only."""
-    wrong, known, given = [], [], []
-    for estimate, truth in zip(estimates, truths):
-        known.append(np.isfinite(truth).all(axis=2))
-        given.append(np.isfinite(estimate).all(axis=2))
-        error, size = np.linalg.norm(estimate - truth, axis=2), np.linalg.norm(truth, axis=2)
-        nothing_there = is_sky(truth[..., 0]) if truth.shape[2] == 1 else False
-        wrong.append(np.where(given[-1], (error > BAD_PX) & (error > BAD_SHARE * size), ~nothing_there))
-    wrong, known, given = [*wrong, np.any(wrong, axis=0)], [*known, np.all(known, axis=0)], [*given, np.all(given, axis=0)]
-    regions = {"all": True} if moving is None else {"all": True, "moving": moving, "static": ~moving}
-    return {name: np.array([[np.count_nonzero(which & k & region) for which in (w, k, g)] for w, k, g in zip(wrong, known, given)]) for name, region in regions.items()}
-
-
-MIN_OBJECT_PIXELS = 150  # of a true object; smaller ones are not asked for
-MIN_OVERLAP = 0.4  # of an object that was found: intersection over union with the true one
 _Motions = Dict[Tuple[str, int], np.ndarray]
-
-
-def match_objects(estimate: np.ndarray, truth: np.ndarray) -> Tuple[Dict[int, int], List[int], List[int]]:
-    """Ids of true objects that were found, each with the estimated one that overlaps most; of those that were not; and of estimated objects that are false.
-    Maps of ids, H x W, 0 where nothing moves by itself. An estimated object is false where no true one has it and most of it stands."""
-    overlaps: Dict[int, Tuple[float, int]] = {}
-    areas = {int(i): np.count_nonzero(estimate == i) for i in np.unique(estimate) if i}
-    for true_id in (int(i) for i in np.unique(truth) if i):
-        region = truth == true_id
-        pixels = np.count_nonzero(region)
-        if pixels < MIN_OBJECT_PIXELS:
-            continue
-        common = {i: np.count_nonzero(region & (estimate == i)) for i in areas}
-        overlaps[true_id] = max(((common[i] / (pixels + areas[i] - common[i]), i) for i in areas), default=(0.0, 0))
-    found = {true_id: own for true_id, (overlap, own) in overlaps.items() if overlap >= MIN_OVERLAP}
-    false = [i for i in areas if i not in found.values() and np.count_nonzero((estimate == i) & (truth > 0)) < MIN_OVERLAP * areas[i]]
-    return found, [i for i in overlaps if i not in found], false
 
 
 def _frame_key(name: str) -> str:
@@ -142,15 +105,10 @@ def _read(file: _Path) -> np.ndarray:
     return np.where(disparity == _egosgm.INVALID_DISPARITY, np.float32(np.nan), disparity)[..., None]
 
 
-def _figures_of(counts: Dict[str, np.ndarray]) -> Dict[str, Any]:
-    return {region: {measure: {"outliers_percent": percent(wrong, known), "density_percent": percent(given, known), "truth_pixels": int(known)}
-                     for measure, (wrong, known, given) in zip(MEASURES, rows)} for region, rows in counts.items()}
-
-
-def _text_of(frames: int, regions: Dict[str, Any], notes: List[str]) -> str:
+def _text_of(frames: int, regions: Dict[str, SceneFlowFigures], notes: List[str]) -> str:
     lines = [counted(frames, "frame"), f"{'outliers':<10}" + "".join(f"{name.upper() if name != 'fl' else 'Fl':>11}" for name in MEASURES) + "    density"]
     for region, figures in regions.items():
-        cells = [figures[name]["outliers_percent"] for name in MEASURES] + [figures["sf"]["density_percent"]]
+        cells = [getattr(figures, name).outliers_percent for name in MEASURES] + [figures.sf.density_percent]
         lines.append(f"{region:<10}" + "".join(f"{'-':>11}" if cell != cell else f"{cell:>9.2f} %" for cell in cells))
     return "\n".join(lines + notes)
 
@@ -187,8 +145,7 @@ def _work(arguments: Sequence[str]) -> str:
     truth = truth / "truth" if (truth / "truth").is_dir() else truth
     pairs, missing = _pairs_of(estimate, truth, given.frames)
     notes = [f"{counted(len(missing), 'truth file')} without an estimate, the first is {missing[0]}"] if missing else []
-    total: Dict[str, np.ndarray] = {}
-    over_frames = []
+    counts = []
     labels, moving = (_place(folder, names, needed=False) for folder, names in ((estimate, ("objects",)), (truth, _MOVING)))
     objects = _Objects(estimate, truth) if labels != _Path() and moving != _Path() else None
     for name, flow in pairs[2].items():
@@ -196,19 +153,19 @@ def _work(arguments: Sequence[str]) -> str:
             raise _egosgm.InvalidArgument(f"{flow.estimate}: its frame has no disparity, or none in the next frame: give one of each")
         true_objects = None if moving == _Path() else _egosgm.read_grey(moving / flow.truth.with_suffix(".png").name)
         maps = _maps_of([of_kind[name] for of_kind in pairs], true_objects)
-        counts = count_outliers(*maps, None if true_objects is None else true_objects != 0)
+        counts.append(count_outliers(*maps, None if true_objects is None else true_objects != 0))
         if objects and true_objects is not None:
             own = _egosgm.read_grey(labels / flow.estimate.with_suffix(".png").name)
             if own.shape != true_objects.shape:
                 raise _egosgm.InvalidArgument(f"{labels}: its map of {name} is of another size than the truth: give one of the same frames")
             objects.add(name, own, true_objects, maps[1][0][..., 0])
-        over_frames.append({"name": name, **_figures_of(counts)})
-        total = {region: total.get(region, 0) + rows for region, rows in counts.items()}
-    regions = _figures_of(total)
+    evaluation = evaluation_of(counts)
     of_objects = {"objects": objects.figures()} if objects else {}
     if given.json:
-        return json_text({"frames": len(over_frames), "regions": regions, **of_objects, "over_frames": over_frames, **({"notes": notes} if notes else {})})
-    return _text_of(len(over_frames), regions, [*map(_text_of_objects, of_objects.values()), *notes])
+        plain = dataclasses.asdict(evaluation)
+        over_frames = [{"name": name, **figures} for name, figures in zip(pairs[2], plain["over_frames"])]
+        return json_text({"frames": len(counts), "regions": plain["regions"], **of_objects, "over_frames": over_frames, **({"notes": notes} if notes else {})})
+    return _text_of(len(counts), evaluation.regions, [*map(_text_of_objects, of_objects.values()), *notes])
 
 
 def main(arguments: Sequence[str]) -> int:

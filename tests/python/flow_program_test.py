@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """egosgm eval-flow against numbers that are counted by hand."""
+import dataclasses
 import json
 import math
 import struct
@@ -8,7 +9,8 @@ import numpy as np
 import pytest
 
 import egosgm
-from egosgm.flow_program import _work, count_outliers, match_objects, motion_errors, read_motions
+from egosgm.evaluation.flow_evaluation import count_outliers, match_objects
+from egosgm.flow_program import _work, motion_errors, read_motions
 
 NO = math.nan
 
@@ -60,6 +62,37 @@ def test_folders_are_compared_frame_by_frame(tmp_path):
     assert (result["frames"], list(result["regions"]), result["over_frames"][0]["name"]) == (1, ["all"], "000003")
     text = _work(["--estimate", str(estimate), "--truth", str(tmp_path)])  # a sequence's folder
     assert "1 frame\n" in text and "SF" in text and text.splitlines()[2].split()[:3] == ["all", "66.67", "%"]
+
+
+def test_arrays_give_what_folders_give(tmp_path):
+    hole = egosgm.INVALID_DISPARITY
+    truths = [([[10, 10, 20, hole]], [[10, 10, 20, 20]], [[[1, 0]] * 4]), ([[10, NO]], [[10, 10]], [[[0, 0]] * 2])]
+    estimates = [([[10, 14, hole, 5]], [[10, 10, NO, 20]], [[[5, 0]] + [[1, 0]] * 3]), ([[10, 10]], [[20, 10]], [[[0, 0]] * 2])]
+    folders = write(tmp_path / "estimate", *estimates[0]), write(tmp_path / "truth", *truths[0])
+    result = json.loads(_work([*map(str, folders), "--json"]))
+    of_one, of_both = (egosgm.evaluate_scene_flow(estimates[:n], truths[:n]) for n in (1, 2))
+    assert {name: dataclasses.asdict(figures) for name, figures in of_one.regions.items()} == result["regions"] and of_one.objects is None
+    assert of_both.over_frames[0] == of_one.regions
+    both = of_both.regions["all"]
+    assert (both.d1, both.d2.truth_pixels, both.sf.truth_pixels) == (egosgm.OutlierFigures(50.0, 75.0, 4), 6, 4)
+
+
+def test_labels_of_arrays_tell_regions_and_objects():
+    disparity, flow = np.full((20, 40), 10, np.float32), np.zeros((20, 40, 2), np.float32)
+    true, own = np.zeros((2, 20, 40), np.uint8)
+    true[:, :10], own[:, :9], own[:, 30:] = 5, 3, 8
+    frame = disparity, disparity + 4 * (true > 0), flow
+    found = egosgm.evaluate_scene_flow([frame] * 2, [(disparity, disparity, flow)] * 2, labels=[own, 0 * own], true_labels=[true] * 2)
+    assert found.objects == egosgm.ObjectCounts(found=1, lost=1, false=1)
+    assert {name: (figures.d2.outliers_percent, figures.d2.truth_pixels) for name, figures in found.regions.items()} == {"all": (25, 1600), "moving": (100, 400), "static": (0, 1200)}
+    assert list(egosgm.evaluate_scene_flow([frame], [frame], labels=[own]).regions) == ["all"]
+    for arguments, message in ((([], []), "no frames"), (([frame], []), "truths has 0 of 1 frames"), (([frame[:2]], [frame]), "estimates: 2 maps"),
+                               (([frame], [(disparity, disparity[:9], flow)]), "frame 0: its maps differ in size: 40x20, 40x9"),
+                               (([frame], [(disparity, disparity, disparity)]), "truths: an array of shape")):
+        with pytest.raises(egosgm.InvalidArgument, match=message):
+            egosgm.evaluate_scene_flow(*arguments)
+    with pytest.raises(egosgm.InvalidArgument, match="40x20, 9x20"):
+        egosgm.evaluate_scene_flow([frame], [frame], true_labels=[true[:, :9]])
 
 
 def test_what_cannot_be_compared_is_named(tmp_path):

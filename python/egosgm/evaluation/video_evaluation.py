@@ -206,7 +206,7 @@ def move(disparity: np.ndarray, calibration: Any, motion: np.ndarray) -> Tuple[n
 
 def move_map(disparity: ArrayLike, calibration: Any, current_from_previous: ArrayLike) -> np.ndarray:
     """A disparity map as the next frame sees it, the nearest surface on top; INVALID_DISPARITY where nothing lies."""
-    before = _map_of(disparity, "disparity")
+    before = map_of(disparity, "disparity")
     inside, place, there = move(before, calibration, poses_of([current_from_previous], "current_from_previous")[0])
     with np.errstate(invalid="ignore"):
         inside &= there > _NONE
@@ -545,7 +545,7 @@ def count_frames(frames: Iterable[Frame], calibration: Optional[Any] = None, mot
                 now.filled = _egosgm.interpolate_background(now.estimate)
             pair = before if i and follows(i) else None
             if pair is not None and pair.estimate.shape != now.estimate.shape:
-                raise _egosgm.InvalidArgument(f"frame {i}: the estimate is {_size(now.estimate)}, that of the frame before {_size(pair.estimate)}; "
+                raise _egosgm.InvalidArgument(f"frame {i}: the estimate is {size_text(now.estimate)}, that of the frame before {size_text(pair.estimate)}; "
                                               "give maps of one size")
             motion = motions(i) if pair is not None and calibration is not None else None
             started.append(pool.submit(_count, now, pair, calibration, motion, near_px))
@@ -556,11 +556,11 @@ def count_frames(frames: Iterable[Frame], calibration: Optional[Any] = None, mot
             yield counts.result()
 
 
-def _size(array: np.ndarray) -> str:
+def size_text(array: np.ndarray) -> str:
     return f"{array.shape[1]}x{array.shape[0]}"
 
 
-def _map_of(item: Any, name: str) -> np.ndarray:
+def map_of(item: Any, name: str) -> np.ndarray:
     if np.ma.is_masked(item):
         raise _egosgm.InvalidArgument(f"{name}: has a mask, which nobody looks at: give its filled(egosgm.INVALID_DISPARITY)")
     array = np.asarray(item, np.float32)
@@ -569,7 +569,7 @@ def _map_of(item: Any, name: str) -> np.ndarray:
     return array
 
 
-def _flow_of(item: Any, name: str) -> np.ndarray:
+def flow_of(item: Any, name: str) -> np.ndarray:
     flow = np.asarray(item, np.float32)
     if flow.ndim != 3 or flow.shape[2] != 2 or not flow.size:
         raise _egosgm.InvalidArgument(f"{name}: an array of shape {flow.shape}: give H x W x 2 arrays")
@@ -584,7 +584,7 @@ def _grey_of(item: Any, name: str) -> np.ndarray:
 
 
 def _mask_of(item: Any, name: str) -> np.ndarray:
-    return _map_of(item, name) != 0
+    return map_of(item, name) != 0
 
 
 def evaluate_video(estimates: Sequence[ArrayLike], truths: _Maps = None, *, calibration: Optional[Any] = None,
@@ -611,23 +611,23 @@ def evaluate_video(estimates: Sequence[ArrayLike], truths: _Maps = None, *, cali
     if poses is not None and (calibration is None or len(poses) != number):
         raise _egosgm.InvalidArgument(f"world_from_camera has {len(poses)} poses of {number} frames{'' if calibration else ' and no calibration'}: "
                                       "give one for each frame, with the calibration")
-    sources = {"truth": (truths, "truths", _map_of), "all_truth": (all_truths, "all_truths", _map_of), "against": (against, "against", _map_of),
-               "uncertainty": (uncertainties, "uncertainties", _map_of), "next_truth": (next_truths, "next_truths", _map_of),
+    sources = {"truth": (truths, "truths", map_of), "all_truth": (all_truths, "all_truths", map_of), "against": (against, "against", map_of),
+               "uncertainty": (uncertainties, "uncertainties", map_of), "next_truth": (next_truths, "next_truths", map_of),
                "moving": (moving, "moving", _mask_of), "image": (images, "images", _grey_of), "reason": (reasons, "reasons", _grey_of),
-               "flow_to_next": (flows, "flows", _flow_of)}
+               "flow_to_next": (flows, "flows", flow_of)}
     for items, name, _ in sources.values():
         if items is not None and len(items) != number:
             raise _egosgm.InvalidArgument(f"{name} has {len(items)} of {number} frames: give one for each estimate, None where there is none")
 
     def frame(i: int) -> Frame:
-        now = Frame(_map_of(estimates[i], "estimates"))
+        now = Frame(map_of(estimates[i], "estimates"))
         for field, (items, name, convert) in sources.items():
             item = None if items is None else items[i]
             if item is None:
                 continue
             array = convert(item, name)
             if array.shape[:2] != now.estimate.shape:
-                raise _egosgm.InvalidArgument(f"frame {i}: the estimate is {_size(now.estimate)}, {name} {_size(array)}; give maps of one size")
+                raise _egosgm.InvalidArgument(f"frame {i}: the estimate is {size_text(now.estimate)}, {name} {size_text(array)}; give maps of one size")
             setattr(now, field, array)
         return now
 
