@@ -54,6 +54,17 @@ static inline int is_within(const int x, const int reach, const int width) {
 
 #define INVALID ((Floats)(EGOSGM_INVALID_DISPARITY))
 
+// Whether there is a disparity, by the sign of a difference: LLVM narrows comparisons that are joined to bytes and
+// widens them again, which takes longer than what is joined. What is joined with nothing is compared with INVALID.
+// REQUIRES: a number.
+static inline Ints is_valid(const Floats d) {
+#if PIXELS == 1
+  return d > INVALID;
+#else
+  return as_int16(INVALID - d) >> 31;
+#endif
+}
+
 // A condition as a number; and whether one holds in any pixel, for work that most blocks need not do. any() asks lane
 // by lane on some compilers (PoCL 3.1).
 static inline Floats one_where(const Ints condition) { return condition ? (Floats)(1.0f) : (Floats)(0.0f); }

@@ -21,15 +21,15 @@ COMPILED_ONCE void check_row(const WorkItem at, const ImageSize size, const floa
       const Floats zero = 0.0f;
       // Asked of the floats, with comparisons that NaN fails, before they become integers.
       const Floats at = nearest(FLOATS_OF_INTS(x + LANE_INDICES) + (view == EGOSGM_LEFT ? -d : d));
-      const Ints inside = (d > INVALID) & (at >= zero) & (at < (Floats)(width));
+      const Ints inside = is_valid(d) & (at >= zero) & (at < (Floats)(width));
       is_inside[i] = inside;
       places[i] = INTS_OF_FLOATS(inside ? at : zero);
     }
     FOR_BLOCKS(x, i, start, width) {
       const Floats d = load_pixels(disparity + row, x, width);
       const Floats other = gather(disparity + other_row, &places[i]);
-      const Ints agree = (other > INVALID) & (fabs(other - d) <= max_difference);
-      const Ints keeps = is_inside[i] ? agree : (d > INVALID) & ((Ints)(keep_outside) != 0);
+      const Ints agree = is_valid(other) & (fabs(other - d) <= max_difference);
+      const Ints keeps = is_inside[i] ? agree : is_valid(d) & ((Ints)(keep_outside) != 0);
       store_pixels(keeps ? d : INVALID, kept + row, x, width);
     }
   }

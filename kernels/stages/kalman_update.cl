@@ -28,7 +28,7 @@
 
 static inline void add_innovations(const Floats d, const Floats z, const float gate, Ints* sums, Ints* counts) {
   const Floats innovation = z - d, steps = EGOSGM_DRIFT_STEPS_PER_PX;
-  const Ints agrees = (d > INVALID) & (z > INVALID) & (fabs(innovation) <= gate);
+  const Ints agrees = is_valid(d) & is_valid(z) & (fabs(innovation) <= gate);
   const Ints nearer = innovation > (Floats)(EGOSGM_DRIFT_SIDE_PX),
              farther = innovation < (Floats)(-EGOSGM_DRIFT_SIDE_PX);
   *sums += INTS_OF_FLOATS(nearest(agrees ? innovation * steps : (Floats)(0.0f)));
@@ -133,10 +133,10 @@ typedef struct {
 static inline Verdict judged(const KalmanParameters* q, const Ints before, const Ints now, const Floats found,
                              const Floats d, const Floats z, const int x, const int view) {
   const float gate = q->gate_px;
-  const Ints has_prediction = d > INVALID;
-  const Ints has_measurement = z > INVALID;
+  const Ints has_prediction = is_valid(d);
+  const Ints has_measurement = is_valid(z);
   const Ints stays = has_prediction & !(has_measurement & (fabs(z - d) > gate));
-  const Ints is_found = (found > INVALID) & (fabs(found - z) <= EGOSGM_EVIDENCE_COARSE_PX);
+  const Ints is_found = is_valid(found) & (fabs(found - z) <= EGOSGM_EVIDENCE_COARSE_PX);
   const Floats away = nearest(d);
   const Floats match = FLOATS_OF_INTS(x + LANE_INDICES) + (view == EGOSGM_LEFT ? -away : away);
   const Ints is_unseen = stays & ((match < (Floats)(0.0f)) | (match >= (Floats)(q->width)));
@@ -166,9 +166,9 @@ static inline void drop_lone(const ImageSize size, const int start, const int y,
   const Ints to_begin = q->sees_again ? EGOSGM_SUPPORTERS_COUNT : EGOSGM_SUPPORTERS_LEAST;
   FOR_BLOCKS(x, i, start, size.width) {
     const Floats d = load_pixels(predicted_row, x, size.width), z = chunk[i];
-    const Ints is_shared = (d > INVALID) & (fabs(z - d) <= gate);
-    const Ints is_new = (z > INVALID) & !is_shared;
-    const Ints enough = d > INVALID ? (Ints)(EGOSGM_SUPPORTERS_LEAST) : to_begin;
+    const Ints is_shared = is_valid(d) & (fabs(z - d) <= gate);
+    const Ints is_new = is_valid(z) & !is_shared;
+    const Ints enough = is_valid(d) ? (Ints)(EGOSGM_SUPPORTERS_LEAST) : to_begin;
     const Ints is_lone = is_new & !have_supporters(size, x, y, is_new, enough, z, EGOSGM_LONE_PX, measured, 0);
     chunk[i] = is_lone ? INVALID : z;
   }
@@ -206,9 +206,9 @@ COMPILED_ONCE void update_row(const WorkItem at, const KalmanParameters q, globa
                          OF_ITS_BLOCK(Ints, block_evidence + row_of_blocks, x),
                          OF_ITS_BLOCK(Floats, found + row_of_blocks, x), d, z, x, at.view);
       }
-      const Ints has_prediction = d > INVALID;
+      const Ints has_prediction = is_valid(d);
       const Ints has_measurement =
-          (z > INVALID) & (is_plain | (load_bytes(hidden + row, x, width) == 0)) & (verdict.counts != 0);
+          is_valid(z) & (is_plain | (load_bytes(hidden + row, x, width) == 0)) & (verdict.counts != 0);
       const Ints has_both = has_prediction & has_measurement;
       const Ints fuses = has_both & (fabs(z - d) <= q.gate_px);
       const Ints predicts = has_prediction & ((Ints)(q.keep_predicted) != 0);
@@ -233,7 +233,7 @@ COMPILED_ONCE void update_row(const WorkItem at, const KalmanParameters q, globa
       store_pixels(variance < least ? least : variance, updated_variance + row, x, width);
       const Ints contradicted = has_both & !fuses;
       store_bytes(contradicted & (Ints)(1), updated_doubtful + row, x, width);
-      store_bytes(value > INVALID ? verdict.sums : (Ints)(0), evidence + row, x, width);
+      store_bytes(is_valid(value) ? verdict.sums : (Ints)(0), evidence + row, x, width);
     }
   }
 }

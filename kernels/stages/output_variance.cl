@@ -16,11 +16,11 @@ static inline Floats counted(const Floats value) { return value >= 0.0f ? (Float
 static inline Floats if_inside(const Floats value) { return value >= 0.0f ? value : (Floats)(0.0f); }
 
 // A variance without a disparity means nothing.
-static inline Floats if_valid(const Floats d, const Floats variance) { return d > INVALID ? variance : (Floats)(0.0f); }
+static inline Floats if_valid(const Floats d, const Floats variance) { return is_valid(d) ? variance : (Floats)(0.0f); }
 
 // |before - 2 at + after|; beside a hole as much as can be.
 static inline Floats second_difference(const Floats before, const Floats at, const Floats after) {
-  const Ints valid = (before > INVALID) & (at > INVALID) & (after > INVALID);
+  const Ints valid = is_valid(before) & is_valid(at) & is_valid(after);
   return valid ? cut(fabs((before + after) - 2.0f * at), EGOSGM_MAX_ROUGHNESS_PX) : (Floats)(EGOSGM_MAX_ROUGHNESS_PX);
 }
 
@@ -29,7 +29,7 @@ static inline Floats second_difference(const Floats before, const Floats at, con
 // hardly.
 static inline Floats blend(const Floats p, const Floats measured, const Floats r) {
   const Floats most = EGOSGM_MAX_MEAN_VARIANCE_PX2;
-  const Floats cut_r = measured > INVALID ? cut(r, EGOSGM_MAX_MEAN_VARIANCE_PX2) : most;
+  const Floats cut_r = is_valid(measured) ? cut(r, EGOSGM_MAX_MEAN_VARIANCE_PX2) : most;
   return sqrt(cut_r * sqrt(cut_r * cut(p, EGOSGM_MAX_MEAN_VARIANCE_PX2)));
 }
 
@@ -124,7 +124,7 @@ static inline Floats jump_beside(global const float* view, const ImageSize size,
     for (int u = -EGOSGM_JUMP_DISTANCE; u <= EGOSGM_JUMP_DISTANCE; u += EGOSGM_JUMP_DISTANCE) {
       const Floats other = load_pixels(view + (size_t)v * size.width, x + u, size.width);
       const Floats difference = fabs(other - d);
-      most = ((other > INVALID) & (difference > most)) ? difference : most;
+      most = (is_valid(other) & (difference > most)) ? difference : most;
     }
   }
   return cut(most, EGOSGM_MAX_JUMP_PX);

@@ -21,7 +21,7 @@ static inline Ints have_supporters(const ImageSize size, const int x, const int 
     for (int u = x - EGOSGM_SUPPORTERS_RADIUS; u <= x + EGOSGM_SUPPORTERS_RADIUS; u += EGOSGM_SUPPORTERS_STEP) {
       if (u == x && v == y) continue;
       const Floats other = load_pixels(disparity + row, u, size.width);
-      Ints counts = (other > INVALID) & (fabs(other - d) <= (Floats)(most));
+      Ints counts = is_valid(other) & (fabs(other - d) <= (Floats)(most));
       if (evidence) counts &= load_bytes(evidence + row, u, size.width) >= EGOSGM_EVIDENCE_CONFIRMED;
       supporters += counts ? (Ints)(1) : (Ints)(0);
     }
