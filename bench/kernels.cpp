@@ -117,7 +117,8 @@ int run(int argc, char** argv) {
   if (!arguments.cases.empty()) {
     if (std::filesystem::exists(arguments.cases))
       throw InvalidArgument("--export " + arguments.cases + ": is there: give a new folder");
-    setenv("OPENCL_LAYERS", CASE_LAYER, 1);
+    const char* const layers = std::getenv("OPENCL_LAYERS");  // the user's stay
+    setenv("OPENCL_LAYERS", (layers && *layers ? layers + std::string(":") : "").append(CASE_LAYER).c_str(), 1);
     setenv("EGOSGM_CACHE", "off", 1);  // a program of a binary has no source
   }
   const shared::ImageSize size = arguments.size.value_or(shared::ImageSize{1242, 375});

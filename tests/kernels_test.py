@@ -3,6 +3,7 @@
 import copy
 import hashlib
 import json
+import os
 import pathlib
 import re
 import shutil
@@ -24,8 +25,9 @@ BYTES = {"h": 1, "c": 1, "t": 2, "s": 2, "j": 4, "i": 4, "f": 4, "m": 8, "l": 8}
 ARITHMETIC = re.compile(r"f(add|sub|mul|div|cmp)|and|or|xor|shl|[al]shr|select")  # without what counts places and turns, too
 
 
-def ruler(*arguments):
-    return subprocess.run([sys.executable, "-B", SOURCE / "bench/kernels.py", "--program", PROGRAM, *arguments], capture_output=True, text=True, timeout=900)
+def ruler(*arguments, **environment):
+    return subprocess.run([sys.executable, "-B", SOURCE / "bench/kernels.py", "--program", PROGRAM, *arguments], capture_output=True, text=True, timeout=900,
+                          env={**os.environ, **environment})
 
 
 def expect(test, schema, value, where="file"):
@@ -109,6 +111,12 @@ class Ruler(unittest.TestCase):
             self.skipTest("no pyopencl, which runs them")
         done = subprocess.run([sys.executable, "-B", folder / "run.py"], capture_output=True, text=True, timeout=900)
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+
+    def test_cases_are_those_under_the_layers_of_the_user(self):
+        folder = self.folder / "cases_of_a_gpu"
+        done = ruler(*SIZE, "--export", folder, OPENCL_LAYERS=os.environ["EGOSGM_GPU_LAYER"])
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertTrue((folder / "full.follow_paths/case.json").exists())
 
 
 def counts(program, arguments):
