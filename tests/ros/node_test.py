@@ -633,6 +633,16 @@ class Parameters(unittest.TestCase):
         self.assertEqual([message.f for message in sent], [100, 100, 101, 101])
         self.assertEqual([(message.min_disparity, message.max_disparity) for message in sent], [(4, 19)] * 4)
         self.assertEqual(node._topics_warning, "")
+        for side in ("left", "right"):  # of a sensor twice as fine, of which the image shows a binned region
+            fine = CameraInfo(height=80, width=200, binning_x=2, binning_y=2, k=[202.0, 0, 74.0, 0, 202.0, 36.0, 0, 0, 1.0])
+            fine.p = [202.0, 0, 74.0, -202.0 * (side == "right"), 0, 202.0, 36.0, 0, 0, 0, 1.0, 0]
+            fine.roi.x_offset, fine.roi.y_offset, fine.roi.width, fine.roi.height = 10, 4, 128, 64
+            node._on_info(side, fine)
+        image.header.stamp.sec += 1
+        node._process(image, image)
+        found = node._cameras.calibration
+        self.assertEqual((found.fx, found.fy, found.cx, found.cy, found.baseline_m), (101, 101, 32, 16, 1))
+        self.assertEqual((sent[-1].f, sent[-1].t, sent[-1].image.width), (101, 1, 64))
         for name, lens, is_told in (("image_raw", 0.1, True), ("image_raw", 0.0, False), ("image_rect_color", 0.1, False)):
             node = self.node("--ros-args", "-r", f"left/image_rect:=left/{name}", "-r", f"right/image_rect:=right/{name}", disparities=16, temporal=False)
             node.trigger_configure()

@@ -17,6 +17,7 @@
 #include <stdexcept>
 #include <stereo_msgs/msg/disparity_image.hpp>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -34,9 +35,32 @@ using sensor_msgs::msg::CameraInfo;
 using sensor_msgs::msg::Image;
 using stereo_msgs::msg::DisparityImage;
 
+/// P and the size of the pixels that there are: a camera info's are of the whole sensor, of which the image shows a
+/// region, and binning makes one pixel of several.
+struct Camera {
+  explicit Camera(const CameraInfo& info)
+      : p(info.p),
+        width(static_cast<int>(is_cut(info) ? info.roi.width : info.width)),
+        height(static_cast<int>(is_cut(info) ? info.roi.height : info.height)) {
+    const int across = std::max(1, static_cast<int>(info.binning_x)),
+              down = std::max(1, static_cast<int>(info.binning_y));
+    for (int i = 0; i < 4; ++i) {
+      p[i] = (p[i] - info.roi.x_offset * p[8 + i]) / across;
+      p[4 + i] = (p[4 + i] - info.roi.y_offset * p[8 + i]) / down;
+    }
+    width /= across;
+    height /= down;
+  }
+
+  static bool is_cut(const CameraInfo& info) { return info.roi.width > 0 && info.roi.height > 0; }
+
+  std::array<double, 12> p;
+  int width, height;
+};
+
 /// What has to be made anew for another calibration or size.
 struct Matching {
-  Matching(const CameraInfo& left, const CameraInfo& right, const egosgm::PipelineOptions& options,
+  Matching(const Camera& left, const Camera& right, const egosgm::PipelineOptions& options,
            const egosgm::Device& device)
       : calibration{left.p[0],
                     left.p[5],
@@ -44,8 +68,8 @@ struct Matching {
                     left.p[6],
                     (left.p[3] - right.p[3]) / right.p[0],
                     right.p[2] - left.p[2]},
-        width(static_cast<int>(left.width)),
-        height(static_cast<int>(left.height)),
+        width(left.width),
+        height(left.height),
         pipeline(calibration, width, height, options, device),
         odometry(calibration) {}
 
@@ -98,7 +122,10 @@ class Disparity : public rclcpp::Node {
 
   void on_info(int side, const CameraInfo& info) {
     std::optional<CameraInfo>& known = infos_[side];
-    if (!known || known->p != info.p || known->width != info.width || known->height != info.height) matching_.reset();
+    const auto of_image = [](const CameraInfo& of) {
+      return std::tie(of.p, of.width, of.height, of.binning_x, of.binning_y, of.roi);
+    };
+    if (!known || of_image(*known) != of_image(info)) matching_.reset();
     known = info;
   }
 
@@ -150,7 +177,7 @@ class Disparity : public rclcpp::Node {
   void process(const Image& left, const Image& right) {
     if (!infos_[0] || !infos_[1]) throw std::runtime_error("no camera info yet of both cameras");
     if (!matching_) {
-      matching_ = std::make_unique<Matching>(*infos_[0], *infos_[1], options_, device_);
+      matching_ = std::make_unique<Matching>(Camera(*infos_[0]), Camera(*infos_[1]), options_, device_);
       for (const int side : {0, 1}) warn_of_raw(*infos_[side], images_in_[side]->get_topic_name());
     }
     Matching& m = *matching_;
