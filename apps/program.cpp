@@ -63,9 +63,10 @@ int refuse_arguments(const CLI::App& program, const CLI::ParseError& error) {
                 "view: the Python package shows frames: pip install the wheel, with \"[rerun]\", and see egosgm.viewer "
                 "(docs/use/python.md); `egosgm run --write overview` draws them into files");
   }
-  return fail(kBadInput,
-              fmt::format("{} \"{}\": see `{}`", typed.starts_with("-") ? "unknown option" : "unexpected argument",
-                          typed, help_hint(command)));
+  const char* const what = typed.starts_with("-") ? "unknown option"
+                           : command.get_parent() ? "unexpected argument"
+                                                  : "no command";
+  return fail(kBadInput, fmt::format("{} \"{}\": see `{}`", what, typed, help_hint(command)));
 }
 
 /// Whether what --help calls the value is a number.

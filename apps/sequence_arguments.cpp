@@ -21,6 +21,18 @@ bool is_image(const std::filesystem::path& file) {
   return !file.extension().empty() && std::filesystem::is_regular_file(file, error);
 }
 
+std::string refuse_pair(const std::string& first, const std::string& second) {
+  std::error_code error;
+  if (!std::filesystem::exists(first, error))
+    return first + ": no such file; give the left and the right picture of a pair, two videos, or one folder";
+  if (std::filesystem::is_directory(first, error) && std::filesystem::is_directory(second, error)) {
+    return first + " and " + second + ": are two folders; give one of a stereo sequence, or of two cameras --left " +
+           shell_word(first + "/*") + " --right " + shell_word(second + "/*") + " --calib FILE";
+  }
+  return "more than one input: " + first + " and " + second +
+         ": give one folder, or the left and the right picture of a pair";
+}
+
 /// `options` that are given, as a shell takes them.
 std::string words_of(const std::vector<std::pair<const char*, std::string>>& options) {
   std::string text;
@@ -84,10 +96,7 @@ std::optional<VideoArguments> SequenceArguments::videos() const {
 std::optional<SequenceArguments> SequenceArguments::as_patterns() const {
   SequenceArguments patterns = *this;
   if (!other_picture.empty()) {
-    if (!is_image(folder) || !left.empty() || !right.empty()) {
-      throw InvalidArgument("more than one input: " + folder + " and " + other_picture +
-                            ": give one folder, or the left and the right picture of a pair");
-    }
+    if (!is_image(folder) || !left.empty() || !right.empty()) throw InvalidArgument(refuse_pair(folder, other_picture));
     patterns.left = std::exchange(patterns.folder, "");
     patterns.right = std::exchange(patterns.other_picture, "");
     return patterns;

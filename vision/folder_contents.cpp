@@ -45,6 +45,7 @@ bool holds_both(const fs::path& folder, const std::string& left, const std::stri
 }
 
 bool holds_images(const fs::path& folder) {
+  if (folder.filename().string().find("disp") != std::string::npos) return false;  // but disparity maps
   const std::vector<std::string> names = names_in(folder);
   return std::any_of(names.begin(), names.end(), [](const std::string& name) { return is_image_name(name); });
 }

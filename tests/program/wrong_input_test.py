@@ -13,7 +13,7 @@ class WrongArguments(ProgramTest):
         self.assertFalse((self.folder / "never").exists(), "refused, but wrote")
 
     def test_unknown_names_are_named(self):
-        self.assert_refused(["rnu"], "rnu", "egosgm --help")
+        self.assert_refused(["rnu", self.street], 'no command "rnu": see `egosgm --help`')
         self.assert_refused(["rnu", "--help"], "rnu", "egosgm --help")
         self.assert_refused(["--versoin"], "--versoin", "egosgm --help")
         self.assert_refused(self.run_with("--disparites", 64), "--disparites", "egosgm run --help")
@@ -106,6 +106,20 @@ class WrongArguments(ProgramTest):
         self.assert_refused(self.run_with("surplus"), "more than one input", "--odometry", "surplus")
         self.assert_refused(self.run_with("--pair-by", "order"), "--pair-by order", "--left")
         self.assert_refused(["run", "--left", "a%d.png", "--right", "b%d.png", "--calib", "c", "--pair-by", "luck", "--out", self.folder / "never"], "luck")
+
+    def test_two_inputs_that_are_no_pair(self):
+        out = ["--out", self.folder / "never"]
+        for left, right in (("nix.png", self.street / "image_1/000000.png"), ("nix.mp4", "nixes.mp4")):
+            self.assert_refused(["run", left, right, *out], f"{left}: no such file; give the left and the right picture")
+        left, right = self.street / "image_0", self.street / "image_1"
+        self.assert_refused(["run", left, right, *out], f"{left} and {right}: are two folders", f"--left '{left}/*' --right '{right}/*' --calib FILE")
+
+    def test_disparity_maps_of_both_cameras_are_no_images(self):
+        self.assert_refused(["run", self.street / "truth", "--out", self.folder / "never"], f"it belongs to the sequence {self.street.resolve()}")
+        half = self.new_folder()
+        for name in ("image_0", "truth"):
+            (half / name).symlink_to(self.street / name)
+        self.assert_refused(["run", half, "--out", self.folder / "never"], f"{half}: has neither image_0 and image_1 nor image_2 and image_3; give the folder that holds them")
 
     def test_patterns_that_the_shell_expanded(self):
         left, right = (sorted((self.street / side).iterdir()) for side in ("image_0", "image_1"))
