@@ -177,16 +177,18 @@ void print_pairing(const vision::EvaluationPairs& found) {
 template <typename Count>
 bool read_count(const Json& json, Count& count) {
   const auto value = json.get<double>();
-  if (!json.is_number() || !(value >= 0 && value <= kMostPixels)) return false;
+  if (!json.is_number() || std::abs(value) > kMostPixels) return false;
   count = static_cast<Count>(value);
   return value == static_cast<double>(count);
 }
 
-/// Whether no part is larger than its whole.
+/// Whether no part is less than nothing or larger than its whole.
 bool are_possible(const DisparityCounts& c) {
-  return c.sky <= c.truth && c.sky_valid <= c.sky && c.sky_valid <= c.valid &&
-         c.valid - c.sky_valid <= c.truth - c.sky && c.bad_1px <= c.valid && c.bad <= c.bad_1px && c.d1 <= c.bad &&
-         c.bad_interpolated <= c.truth && c.d1_interpolated <= c.bad_interpolated;
+  return 0 <= c.sky_valid && 0 <= c.d1 && 0 <= c.d1_interpolated &&
+         std::abs(c.signed_error_px) <= c.absolute_error_px && c.sky <= c.truth && c.sky_valid <= c.sky &&
+         c.sky_valid <= c.valid && c.valid - c.sky_valid <= c.truth - c.sky && c.bad_1px <= c.valid &&
+         c.bad <= c.bad_1px && c.d1 <= c.bad && c.bad_interpolated <= c.truth &&
+         c.d1_interpolated <= c.bad_interpolated;
 }
 
 /// The counts of each pair of a report. Throws InvalidArgument.

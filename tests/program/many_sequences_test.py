@@ -184,13 +184,17 @@ class ManySequences(ProgramTest):
         self.assertEqual(json.loads(self.assert_works("eval", "--merge", reports[0], "--json"))["pooled"], json.loads(reports[0].read_text())["pooled"])
         self.assertIn("pooled", self.assert_works("eval", "--merge", *reports))
         text = reports[0].read_text()
-        for broken in ('{"pairs": [{}]}', '{"pairs": []}', *(re.sub(r'"truth": \d+', f'"truth": {count}', text) for count in ("-5", "1", "1.5", "1e300", "true"))):
+        wrong = [("truth", count) for count in ("-5", "1", "1.5", "1e300", "true")]
+        wrong += [("d1", -1), ("d1_interpolated", -1), ("sky_valid", -1), ("absolute_error_px", -1), ("signed_error_px", "1e9"), ("signed_error_px", "-1e9")]
+        for broken in ('{"pairs": [{}]}', '{"pairs": []}', *(re.sub(rf'("{name}":) [-.\d]+', rf"\1 {count}", text, count=1) for name, count in wrong)):
             (out / "no.json").write_text(broken)
             self.assert_refused(["eval", "--merge", reports[1], out / "no.json"], "no.json", "egosgm eval --json")
         part, first = self.new_folder() / "part.json", json.loads(text)
         part.write_text(json.dumps(first | {"pairs": first["pairs"][1:]}))
         for again in (out / f"../{out.name}/0.json", part):
             self.assert_refused(["eval", "--merge", *reports, again], again, f"holds pairs of {reports[0]}", "once")
+        part.write_text(re.sub(r'("signed_error_px":) -?', r"\1 -", text))  # estimates that look too far
+        self.assertLess(json.loads(self.assert_works("eval", "--merge", part, "--json"))["pooled"]["mean_error"], 0)
         part.write_text(json.dumps(first | {"warnings": ["another scale?"]}))
         self.assertIn(f"{part}: another scale?", self.assert_works("eval", "--merge", part))
         self.assertEqual(json.loads(self.assert_works("eval", "--merge", part, "--json"))["warnings"], [f"{part}: another scale?"])
