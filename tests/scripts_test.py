@@ -16,7 +16,7 @@ import unittest
 import unittest.mock
 
 SCRIPTS = pathlib.Path(__file__).resolve().parents[1] / "scripts"
-SHARED = ("usage.sh", "usage.py")
+SHARED = ("usage.sh", "usage.py", "old_glibc.sh")
 
 
 def explanation(script):
@@ -176,6 +176,19 @@ class Scripts(unittest.TestCase):
         self.assertEqual({name: part["end"] for name, part in found["parts"].items()}, {**dict.fromkeys(self.PARTS, "passed"), "stages": "stopped after 0.1 s"})
         self.assertIn("stages: stopped after 0.1 s", said.getvalue())
         self.assertEqual((found["device"], found["rows"], found["stream"]), ("a GPU", [], [2]))
+
+    def test_a_pack_builds_nothing_and_knows_its_processor(self):
+        packed = {name.replace("build-device/", "packed/"): text.replace("#!/bin/sh\n", "#!/bin/sh\n[ -n \"${PYOPENCL_HOME+set}\" ] || kill -SEGV $$\n")
+                  for name, text in self.DEVICE.items()}
+        root = self.measured_by({**packed, "packed/arch": f"{os.uname().machine}\n"})
+        pathlib.Path(self.folder.name, "cmake").write_text("#!/bin/sh\necho 'no cmake' >&2\nexit 99\n")
+        done = self.called(root / "scripts/bench-device", "--all")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual({part["end"] for part in json.loads((root / "build-device/stages.json").read_text())["parts"].values()}, {"passed"})
+        (root / "packed/arch").write_text("pdp11\n")
+        done = self.called(root / "scripts/bench-device", "--all")
+        self.assertEqual((done.returncode, done.stdout), (1, ""))
+        self.assertIn("packed for pdp11, and this machine is", done.stderr)
 
     def test_a_path_with_a_blank_and_a_comma_is_one_path_or_refused(self):
         root = pathlib.Path(self.folder.name, "a b, c")
