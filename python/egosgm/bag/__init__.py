@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .. import _egosgm
 from ..calibration import reader as calibrations
-from .parts import Parts
+from .parts import Parts, first_line, remedy_of
 from ..calibration.rectification import StereoRig
 from .ros_images import BODY_FROM_OPTICAL, Cameras, are_raw, grey_of, is_set, needs, quaternion_of, rotation_of, stamp_ns
 
@@ -203,8 +203,7 @@ class Bag:
         except (_egosgm.InvalidArgument, _egosgm.IoError, _egosgm.DeviceError):
             raise
         except Exception as error:  # whatever a decoder of what is broken may raise
-            reason = str(error).strip().partition("\n")[0] or type(error).__name__
-            raise _egosgm.InvalidArgument(f"{self.path}: cannot be read as a bag: {reason}{_remedy(self.path)}") from error
+            raise _egosgm.InvalidArgument(f"{self.path}: cannot be read as a bag: {first_line(error)}{_remedy(self.path)}") from error
 
     def _find_topics(self, left: str, right: str) -> Tuple[str, str]:
         """The topics of both cameras, where there is one choice; of one camera's raw and rectified images the rectified."""
@@ -394,7 +393,7 @@ class _Reading:
 
     def _note_broken(self, topic: str, stamp: int, error: Exception) -> None:
         broken = self._gaps.broken
-        broken.append(f"{topic} at {stamp // 10**9}.{stamp % 10**9:09d} s: {str(error).partition(chr(10))[0] or type(error).__name__}")
+        broken.append(f"{topic} at {stamp // 10**9}.{stamp % 10**9:09d} s: {first_line(error)}")
         if self._number == 0 and len(broken) >= _MOST_BROKEN:
             raise _egosgm.InvalidArgument(f"{self._bag.path}: {broken[0]}")
 
@@ -433,8 +432,7 @@ def _in_order(messages: Iterator[Tuple[int, int, Any]]) -> Iterator[Tuple[int, i
 def _remedy(path: pathlib.Path) -> str:
     if path.is_file() and (path.parent / "metadata.yaml").exists():
         return f"; it is a part of the bag {path.parent}: give that folder"
-    tool = {".mcap": "mcap recover", ".bag": "rosbag reindex", ".db3": "sqlite3 FILE .recover"}.get(path.suffix)
-    return f"; if its recording was cut short, `{tool}` mends it" if tool else ""
+    return remedy_of(path)
 
 
 def _with_slash(topic: str, there: Collection[str]) -> str:

@@ -62,11 +62,11 @@ class Parts:
                 reason = self._opens([part])
                 whole.append(part if reason is None else self._mended(part, reason))
             except Exception as failure:  # of this part alone
-                broken.append(f"{file.name} ({_first_line(failure)})")
+                broken.append(f"{file.name} ({first_line(failure)})")
         if not whole:
-            raise _egosgm.InvalidArgument(f"{self._path}: cannot be read as a bag: none of its parts can be read: {', '.join(broken)}{_remedy_of(files[0])}")
+            raise _egosgm.InvalidArgument(f"{self._path}: cannot be read as a bag: none of its parts can be read: {', '.join(broken)}{remedy_of(files[0])}")
         if is_described:
-            self.notes.append(f"metadata.yaml does not describe the bag ({_first_line(error)}): its parts are read as they are")
+            self.notes.append(f"metadata.yaml does not describe the bag ({first_line(error)}): its parts are read as they are")
         if broken:
             self.notes.append(f"{len(broken)} of {len(files)} parts cannot be read and are left out: {', '.join(broken)}")
         return whole
@@ -91,7 +91,7 @@ class Parts:
         if file.suffix != ".mcap":
             raise error
         reader, records, writer = needs("mcap.stream_reader"), needs("mcap.records"), needs("mcap.writer")
-        copy, count, reason = self._copy(f"mended_{file.name}"), 0, _first_line(error)
+        copy, count, reason = self._copy(f"mended_{file.name}"), 0, first_line(error)
         with open(file, "rb") as source, open(copy, "wb") as target:
             out, schemas, channels = writer.Writer(target), {0: 0}, {}
             out.start(profile="ros2", library="egosgm")
@@ -113,7 +113,7 @@ class Parts:
             except (_egosgm.InvalidArgument, OSError):
                 raise
             except Exception as cut:
-                reason = _first_line(cut) if reason.startswith(_NO_PROFILE) else reason
+                reason = first_line(cut) if reason.startswith(_NO_PROFILE) else reason
             out.finish()
         if count == 0 or self._opens([copy]) is not None:
             raise error
@@ -122,10 +122,11 @@ class Parts:
         return copy
 
 
-def _first_line(error: Optional[Exception]) -> str:
-    return str(error).strip().partition("\n")[0] or type(error).__name__
+def first_line(error: Optional[Exception]) -> str:
+    """What an error says first, without a full stop: more follows."""
+    return str(error).strip().partition("\n")[0].rstrip(".") or type(error).__name__
 
 
-def _remedy_of(file: pathlib.Path) -> str:
+def remedy_of(file: pathlib.Path) -> str:
     tool = {".mcap": "mcap recover", ".bag": "rosbag reindex", ".db3": "sqlite3 FILE .recover"}.get(file.suffix)
     return f"; if its recording was cut short, `{tool}` mends it" if tool else ""
