@@ -175,7 +175,7 @@ ALWAYS_INLINE void store_pixels(const Floats pixels, global float* row, const in
 #if PIXELS == 1
   row[x] = pixels;
 #else
-  if (width == EVERYWHERE || x + PIXELS <= width) {
+  if (x + PIXELS <= width) {
     ((global PackedFloats*)(row + x))->lanes = pixels;
   } else {
     store_pixels_at_edge(pixels, row + x, width - x);
@@ -192,17 +192,17 @@ static inline Ints load_bytes(global const uchar* row, const int x, const int wi
 #if PIXELS == 1
   return x >= 0 && x < width ? row[x] : 0;
 #else
-  if (x >= 0 && x + PIXELS <= width) return convert_int16(((global const PackedBytes*)(row + x))->lanes);
+  if (is_within(x, 0, width)) return convert_int16(((global const PackedBytes*)(row + x))->lanes);
   return load_bytes_at_edge(row, x, width);
 #endif
 }
 
 // Writes bytes. REQUIRES: values from 0 to 255; x lies in the row.
-ALWAYS_INLINE void store_bytes(const Ints values, global uchar* row, const int x, const int width) {
+static inline void store_bytes(const Ints values, global uchar* row, const int x, const int width) {
 #if PIXELS == 1
   row[x] = (uchar)values;
 #else
-  if (width == EVERYWHERE || x + PIXELS <= width) {
+  if (x + PIXELS <= width) {
     ((global PackedBytes*)(row + x))->lanes = convert_uchar16(values);
   } else {
     store_bytes_at_edge(convert_uchar16(values), row + x, width - x);
@@ -219,8 +219,7 @@ static inline Ints load_words(global const int* row, const int x, const int widt
 #if PIXELS == 1
   return x >= 0 && x < width ? row[x] : 0;
 #else
-  return x >= 0 && x + PIXELS <= width ? ((global const PackedInts*)(row + x))->lanes
-                                       : load_words_at_edge(row, x, width);
+  return is_within(x, 0, width) ? ((global const PackedInts*)(row + x))->lanes : load_words_at_edge(row, x, width);
 #endif
 }
 
@@ -229,7 +228,7 @@ static inline void store_words(const Ints words, global uchar* row, const int x,
 #if PIXELS == 1
   ((global int*)row)[x] = words;
 #else
-  if (width == EVERYWHERE || x + PIXELS <= width) {
+  if (x + PIXELS <= width) {
     ((global PackedInts*)(row + 4 * x))->lanes = words;
   } else {
     store_words_at_edge(words, (global int*)row + x, width - x);
