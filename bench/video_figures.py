@@ -191,12 +191,12 @@ def errors_of(disparity, truth):
 
 
 def errors_and_variances(video, frames, **options):
-    """Of each of the frames numbered `frames`: errors, variances, rows and columns of all pixels with truth and a disparity."""
+    """Of each of the frames numbered `frames`: errors and variances of all pixels with truth and a disparity."""
     pairs = []
     for k, frame in play(video, **options):
         if k in frames:
             errors, y, x = errors_of(frame.disparity, video.truth(k))
-            pairs.append((errors, frame.variance[y, x].astype(float), y, x))
+            pairs.append((errors, frame.variance[y, x].astype(float)))
     return pairs
 
 
@@ -211,51 +211,14 @@ def interpolated(video, number, max_variances, **options):
 
 
 def median_error(pairs):
-    return float(np.median(np.concatenate([errors for errors, *_ in pairs])))
-
-
-def without_offset(pairs):
-    """The errors less each frame's median one: a step between cameras and truth that all matchers share is no pixel's uncertainty."""
-    return [(errors - np.median(errors), *others) for errors, *others in pairs]
-
-
-def blocks_of(y, x, side):
-    return y // side * 1000 + x // side
-
-
-def medians_by_block(errors, y, x, side=64, least=500):
-    """The median error of each block of side x side pixels that has `least` of them, by the block's number."""
-    blocks = blocks_of(y, x, side)
-    return {block: float(np.median(errors[blocks == block])) for block, pixels in zip(*np.unique(blocks, return_counts=True)) if pixels >= least}
-
-
-def median_size(values):
-    return float(np.median(np.abs(values)))
-
-
-def field(errors, y, x):
-    """What lies under a matcher's errors as a quadratic of the place, a function of (y, x): where different matchers have the same, it is
-    what cameras and truth are off by. Least squares in which what is further from it than half a pixel weighs little (Geman and McClure
-    1985)."""
-    def terms(y, x):
-        v, u = y / 1000, x / 1000
-        return np.stack([np.ones_like(u), u, v, u * v, u * u, v * v], axis=-1)
-    a, weights = terms(y, x), np.ones(len(errors))
-    for _ in range(20):
-        fitted = np.linalg.lstsq(a * weights[:, None], errors * weights, rcond=None)[0]
-        weights = 1 / (1 + ((errors - a @ fitted) / 0.5)**2)
-    return lambda y, x: terms(y, x) @ fitted
-
-
-def without_field(pairs, fields):
-    return [(errors - off(y, x), variances, y, x) for (errors, variances, y, x), off in zip(pairs, fields)]
+    return float(np.median(np.concatenate([errors for errors, _ in pairs])))
 
 
 def calibration_of_variance(pairs, bins=10):
     """What the variances are worth. `ratio`: mean of error^2 / variance, errors cut at 3 px, since a few mismatches would decide it.
     `flatness`: the largest such ratio of the `bins` parts of the pixels in order of their variance, by the smallest. `removed`: percent
-    of the bad pixels among the tenth of each frame with the largest variances. `bins`: predicted and actual deviation of those parts."""
-    pairs = [(np.abs(errors), variances) for errors, variances, *_ in pairs]
+    of the bad pixels among the tenth of each frame with the largest variances."""
+    pairs = [(np.abs(errors), variances) for errors, variances in pairs]
     errors, variances = (np.concatenate(values) for values in zip(*pairs))
     cut = np.minimum(errors, BAD_PX)**2
     removed = []
@@ -265,69 +228,7 @@ def calibration_of_variance(pairs, bins=10):
     parts = np.array_split(np.argsort(variances, kind="stable"), bins)
     ratios = [cut[part].mean() / variances[part].mean() for part in parts]
     return {"ratio": float(np.mean(cut / variances)), "ratio_not_bad": float(np.mean((errors**2 / variances)[errors <= BAD_PX])),
-            "flatness": float(max(ratios) / min(ratios)), "removed": share(removed),
-            "bins": [{"predicted_px": float(np.sqrt(variances[part].mean())), "actual_px": float(np.sqrt(cut[part].mean()))} for part in parts]}
-
-
-def parts_in_order(variances, bins):
-    """For each pixel, which of the `bins` parts in order of the variance it belongs to."""
-    part = np.empty(len(variances), int)
-    for n, pixels in enumerate(np.array_split(np.argsort(variances, kind="stable"), bins)):
-        part[pixels] = n
-    return part
-
-
-def likeness(pairs, lag, bins=10):
-    """Correlation of pixels `lag` columns apart, in what their error^2 is off by from the mean of their part in order of the variance."""
-    products, squares = [], []
-    for errors, variances, y, x in pairs:
-        part, cut = parts_in_order(variances, bins), np.minimum(np.abs(errors), BAD_PX)**2
-        residual = np.full((y.max() + 1, x.max() + lag + 1), np.nan)
-        residual[y, x] = cut / (np.bincount(part, cut) / np.bincount(part))[part] - 1
-        both = residual[y, x] * residual[y, x + lag]
-        products.append(both[np.isfinite(both)])
-        squares.append(residual[y, x]**2)
-    return float(np.mean(np.concatenate(products)) / np.mean(np.concatenate(squares)))
-
-
-def flatness_by_chance(pairs, bins=10, rounds=1000, percentile=95, side=64):
-    """What `flatness` would stay below 95 of 100 times if the variances were flat: of frames whose blocks of side x side pixels are drawn
-    anew, as errors of neighbours are alike, with each part's ratio divided by that of all blocks."""
-    errors, variances = (np.concatenate(values) for values in list(zip(*pairs))[:2])
-    blocks = np.unique(np.concatenate([blocks_of(y, x, side) + 10**6 * n for n, (_, _, y, x) in enumerate(pairs)]), return_inverse=True)[1]
-    cells = blocks * bins + parts_in_order(variances, bins)
-    sums = [np.bincount(cells, values, (blocks.max() + 1) * bins).reshape(-1, bins) for values in (np.minimum(np.abs(errors), BAD_PX)**2, variances)]
-    drawn = np.random.default_rng(1).multinomial(len(sums[0]), np.full(len(sums[0]), 1 / len(sums[0])), rounds)
-    ratios = (drawn @ sums[0]) / (drawn @ sums[1]) / (sums[0].sum(axis=0) / sums[1].sum(axis=0))
-    return float(np.percentile(ratios.max(axis=1) / ratios.min(axis=1), percentile))
-
-
-def least_flatness(scenes, bins=10, levels=200):
-    """The least that the largest `flatness` of the scenes (lists as `errors_and_variances` gives them) can become by a function of the
-    variance that keeps its order: no scale, floor or curve does better. The function has `levels` steps; for a flatness F, whether there is
-    one is a linear programme: part i of scene s holds f(variances)_si <= h_s errors^2_si <= F f(variances)_si on average."""
-    from scipy.optimize import linprog
-    scenes = [[np.concatenate(values) for values in list(zip(*pairs))[:2]] for pairs in scenes]
-    edges = np.quantile(np.concatenate([variances for _, variances in scenes]), np.linspace(0, 1, levels + 1)[1:-1])
-    parts = [(n, part, errors, variances) for n, (errors, variances) in enumerate(scenes)
-             for part in np.array_split(np.argsort(variances, kind="stable"), bins)]
-    means = np.array([np.bincount(np.searchsorted(edges, variances[part]), minlength=levels) / len(part) for _, part, _, variances in parts])
-    actual = np.zeros((len(parts), len(scenes)))
-    for row, (n, part, errors, _) in enumerate(parts):
-        actual[row, n] = np.mean(np.minimum(np.abs(errors[part]), BAD_PX)**2)
-    falls = np.hstack([np.eye(levels - 1, levels) - np.eye(levels - 1, levels, 1), np.zeros((levels - 1, len(scenes)))])
-    bounds = [(1e-6, None)] * levels + [(1, 1)] + [(1e-6, None)] * (len(scenes) - 1)  # the scale is free
-
-    def is_possible(flatness):
-        rows = np.vstack([np.hstack([means, -actual]), np.hstack([-flatness * means, actual]), falls])
-        return linprog(np.zeros(rows.shape[1]), rows, np.zeros(len(rows)), bounds=bounds, method="highs").status == 0
-    low, high = 1.0, 1.0
-    while not is_possible(high):
-        low, high = high, 2 * high
-    while high - low > 0.005:
-        middle = (low + high) / 2
-        low, high = (low, middle) if is_possible(middle) else (middle, high)
-    return high
+            "flatness": float(max(ratios) / min(ratios)), "removed": share(removed)}
 
 
 def dynamic_map(video, first, **options):

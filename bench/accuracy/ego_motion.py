@@ -9,60 +9,38 @@ from inputs import SINGLE_FRAME, Input, Missing, expect
 from tables import Table
 
 
-# Poses as rows of 3x4 matrices, without a fourth row.
-def read_poses(path):
-    rows = [[float(value) for value in line.split()] for line in path.read_text().splitlines() if line.strip()]
-    return [[row[0:4], row[4:8], row[8:12]] for row in rows]
-
-
-def write_poses(path, poses):
-    path.write_text("".join(" ".join(f"{value:.17g}" for row in pose for value in row) + "\n" for pose in poses))
-
-
-def product(a, b):
-    return [[sum(a[i][k] * b[k][j] for k in range(3)) + (a[i][3] if j == 3 else 0) for j in range(4)] for i in range(3)]
-
-
-def inverse(a):
-    turned = [[a[j][i] for j in range(3)] for i in range(3)]
-    return [row + [-sum(row[k] * a[k][3] for k in range(3))] for row in turned]
-
-
-IDENTITY = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]
-
-
-def scaled(motion, factor):
-    return [row[:3] + [factor * row[3]] for row in motion]
-
-
-# What could take the place of odometry's motions (current from previous), from frame to frame.
-OTHER_MOTIONS = [
-    ("2 % more translation", lambda motions: [scaled(motion, 1.02) for motion in motions]),
-    ("2 % less translation", lambda motions: [scaled(motion, 0.98) for motion in motions]),
-    ("its translation, no rotation", lambda motions: [[one[:3] + [row[3]] for one, row in zip(IDENTITY, motion)] for motion in motions]),
-    ("the last motion", lambda motions: motions[:1] + motions[:-1]),
-    ("no motion at all", lambda motions: [IDENTITY for _ in motions]),
-]
+def other_motions(np, motions):
+    """What could take the place of odometry's motions (current from previous), from frame to frame, by name."""
+    def with_translation(motion, factor, rotation):
+        changed = np.eye(4)
+        changed[:3, :3], changed[:3, 3] = rotation, factor * motion[:3, 3]
+        return changed
+    return {"2 % more translation": [with_translation(motion, 1.02, motion[:3, :3]) for motion in motions],
+            "2 % less translation": [with_translation(motion, 0.98, motion[:3, :3]) for motion in motions],
+            "its translation, no rotation": [with_translation(motion, 1, np.eye(3)) for motion in motions],
+            "the last motion": motions[:1] + motions[:-1],
+            "no motion at all": [np.eye(4) for _ in motions]}
 
 
 def with_motions(bench, source, name, motions):
     """The same input with motions of its own."""
-    poses = [IDENTITY]
+    figures = bench.video_figures()
+    poses = [figures.np.eye(4)]
     for motion in motions:
-        poses.append(product(poses[-1], inverse(motion)))
+        poses.append(poses[-1] @ figures.np.linalg.inv(motion))
     path = bench.work / f"poses_{re.sub(r'[^a-z0-9]+', '_', name)}.txt"
-    write_poses(path, poses)
-    return Input(f"{source.title}, {name}", source.run_arguments + ("--poses", str(path)), source.left, source.right, source.truth,
-                 source.scored)
+    figures.egosgm.write_poses(path, figures.np.stack(poses))
+    return Input(f"{source.title}, {name}", source.run_arguments + ("--poses", str(path)), source.truth, source.scored)
 
 
 def worth_of_motion(bench, table):
     source = bench.multiview(2012, "000151", "7:10")
     estimated = bench.work / "poses_000151.txt"
     bench.egosgm("odometry", *source.run_arguments, "--out", estimated, "--quiet")
-    poses = read_poses(estimated)
-    motions = [product(inverse(current), previous) for previous, current in zip(poses, poses[1:])]
-    others = [with_motions(bench, source, name, change(motions)) for name, change in OTHER_MOTIONS]
+    figures = bench.video_figures()
+    poses = figures.egosgm.read_poses(estimated)
+    motions = [figures.np.linalg.inv(current) @ previous for previous, current in zip(poses, poses[1:])]
+    others = [with_motions(bench, source, name, changed) for name, changed in other_motions(figures.np, motions).items()]
     alone = with_motions(bench, source, "odometry, covariance zero", motions)
     frames = {other.title: bench.run(other)["frames"][source.scored] for other in (alone, *others)}
     own, single = (bench.run(source, a)["frames"][source.scored] for a in ((), SINGLE_FRAME))

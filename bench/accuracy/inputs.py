@@ -76,18 +76,11 @@ def newest_build():
 class Input:
     """A sequence, the truth of some of its frames, and the frames that count."""
 
-    def __init__(self, title, run_arguments, left, right, truth=None, scored=None, poses=None):
+    def __init__(self, title, run_arguments, truth=None, scored=None, poses=None):
         self.title, self.run_arguments = title, tuple(map(str, run_arguments))
-        self.left, self.right = left, right  # of a frame's number, as in "{:06d}.png"
         self.truth = truth    # a file (then `scored` is its frame) or a folder of files named like the frames
         self.scored = scored  # a frame's number, or None: all from STEADY_FROM on
         self.poses = poses    # true poses, to compare with
-
-    def images(self, frame):
-        return [str(pattern).format(frame) for pattern in (self.left, self.right)]
-
-    def truth_of(self, frame):
-        return self.truth / f"{frame:06d}.png" if self.truth.is_dir() else self.truth
 
 
 class Bench:
@@ -110,8 +103,7 @@ class Bench:
         """KITTI's multi-view scenes, with truth at frame 10."""
         folder = folder or self.data / f"kitti{year}" / "training"
         truth = expect(folder / ("disp_noc" if year == 2012 else "disp_noc_0") / f"{scene}_10.png")
-        left, right = (folder / side / (scene + "_{:02d}.png") for side in CAMERAS[year])
-        return Input(f"{year} / {scene}, frames {frames}", ("--kitti", folder, "--scene", scene, "--frames", frames), left, right, truth, 10)
+        return Input(f"{year} / {scene}, frames {frames}", ("--kitti", folder, "--scene", scene, "--frames", frames), truth, 10)
 
     def backwards(self, year, scene):
         """Frames 11 and 10 in this order: two frames whose second one has truth."""
@@ -126,12 +118,11 @@ class Bench:
                 link.symlink_to(expect(folder / side / f"{scene}_{original}.png").resolve())
         calibration = folder / ("calib" if year == 2012 else "calib_cam_to_cam") / f"{scene}.txt"
         left, right = (played / side for side in CAMERAS[year])
-        return Input(f"{year} / {scene}, frames 11, 10", ("--left", left / "%06d.png", "--right", right / "%06d.png", "--calib", calibration),
-                     left / "{:06d}.png", right / "{:06d}.png", truth, 1)
+        return Input(f"{year} / {scene}, frames 11, 10",
+                     ("--left", left / "%06d.png", "--right", right / "%06d.png", "--calib", calibration), truth, 1)
 
     def odometry_layout(self, title, folder, motion=(), truth=None):
-        return Input(title, ("--odometry", folder, *motion), folder / "image_0/{:06d}.png", folder / "image_1/{:06d}.png", truth,
-                     poses=folder / "poses.txt")
+        return Input(title, ("--odometry", folder, *motion), truth, poses=folder / "poses.txt")
 
     def odometry_a(self):
         return self.odometry_layout("odometry A", expect(self.data / "odometry/sequences/A"))
@@ -209,14 +200,6 @@ class Bench:
 
     def evaluate_poses(self, estimate, truth, *arguments):
         return json.loads(self.egosgm("eval-poses", "--estimate", estimate, "--truth", truth, "--json", *arguments))
-
-    def match_opencv(self, source, number, mode):
-        """OpenCV's disparity of a frame: a file that the next call overwrites."""
-        if not self.opencv:
-            raise Missing("no program egosgm_opencv_sgbm: build with EGOSGM_BENCH=ON")
-        estimate = self.work / f"{mode}.png"
-        self.opencv(mode, *source.images(number), 128, estimate)
-        return estimate
 
 
 def scored_frames(source, result):

@@ -181,37 +181,11 @@ def poles(bench, table):
 def uncertainty(bench, table):
     """What the variances are worth."""
     figures = bench.video_figures()
-    kitti, fields = [], []
 
-    def flatness(title, pairs, fields=()):
-        chance = figures.flatness_by_chance(pairs)
-        table.add(title, "the same by tenths, largest / smallest", figures.calibration_of_variance(pairs)["flatness"], "", goal=chance)
-        if "synthetic" not in title:
-            table.add(title, "and less the median error", figures.calibration_of_variance(figures.without_offset(pairs))["flatness"], "", goal=chance)
-            table.add(title, "the goal with blocks of 32 instead of 64 px", figures.flatness_by_chance(pairs, side=32), "")
-        if fields:
-            less = figures.without_field(pairs, fields)
-            table.add(title, "and less what OpenCV's matcher is off by", figures.calibration_of_variance(less)["flatness"], "",
-                      goal=figures.flatness_by_chance(less))
-            table.add(title, "error^2 / variance, less that", figures.calibration_of_variance(less)["ratio"], "")
-
-    def field(title, year, scene, video, pairs):
-        """What OpenCV's matcher is off by too, and how alike the two are in that."""
-        other = figures.egosgm.read_disparity(bench.match_opencv(bench.multiview(year, scene, "10:11"), 10, "opencv_hh"))
-        (errors, _, *place), theirs = pairs[0], figures.errors_of(other, video.truth(10))
-        ours, opencv = figures.medians_by_block(errors, *place), figures.medians_by_block(*theirs)
-        both = ours.keys() & opencv.keys()
-        for figure, values in (("median errors of blocks of 64 px, their size", [ours[block] for block in both]),
-                               ("the same of OpenCV's HH", [opencv[block] for block in both]),
-                               ("the same of their difference", [ours[block] - opencv[block] for block in both])):
-            table.add(title, figure, figures.median_size(values), "px")
-        table.add(title, "correlation of error^2 / variance, 32 px aside", figures.likeness(pairs, 32), "")
-        return figures.field(*theirs)
-
-    def add(title, pairs, limit, fields=()):
+    def add(title, pairs, limit):
         worth = figures.calibration_of_variance(pairs)
         table.add(title, "error^2 / variance, errors cut at 3 px", worth["ratio"], "", limit=limit)
-        flatness(title, pairs, fields)
+        table.add(title, "the same by tenths, largest / smallest", worth["flatness"], "")
         table.add(title, "error^2 / variance of what is not bad", worth["ratio_not_bad"], "")
         table.add(title, "of the bad, in the worst 10 % by variance", worth["removed"], limit="uncertainty, removed" if limit else None, goal=50)
     streets = [figures.Street(bench.synthetic_folder(seed=seed)) for seed in (1, 2, 3)]
@@ -219,31 +193,14 @@ def uncertainty(bench, table):
         "uncertainty, ratio")
     for year, scene, numbers in ((2012, "000151", (7, 8, 9, 10)), (2012, "000138", (11, 10)), (2015, "000002", (11, 10))):
         video = bench.scene(year, scene, numbers)
-        kitti += (pairs := figures.errors_and_variances(video, [10]))
-        table.fill(f"{year} / {scene}", lambda: fields.append(field(f"{year} / {scene}", year, scene, video, pairs)))
-        add(f"{year} / {scene}", pairs, None, fields[-1:])
+        pairs, alone = (figures.errors_and_variances(video, [10], **options) for options in ({}, figures.SINGLE_FRAME))
+        add(f"{year} / {scene}", pairs, None)
         table.add(f"{year} / {scene}", "median error", figures.median_error(pairs), "px")
-        alone = figures.errors_and_variances(video, [10], **figures.SINGLE_FRAME)
         table.add(f"{year} / {scene}, single frame", "error^2 / variance, errors cut at 3 px", figures.calibration_of_variance(alone)["ratio"], "")
         every, certain = figures.interpolated(video, 10, [float("inf"), CERTAIN_VARIANCE_PX2])
         every_alone = figures.interpolated(video, 10, [float("inf")], **figures.SINGLE_FRAME)[0]
         table.add(f"{year} / {scene}", "bad after interpolation", every, single=every_alone)
         table.add(f"{year} / {scene}", f"the same, variances above {CERTAIN_VARIANCE_PX2} px^2 left out before", certain, goal=every)
-    flatness("these three together", kitti, fields)
-    table.fill("these three, each alone", lambda: least_flatness(figures, table, kitti, fields))
-
-
-def least_flatness(figures, table, scenes, fields):
-    """How flat any scale, floor or curve of these variances could be: what is more than that lies in what they are made of."""
-    try:
-        import scipy.optimize  # noqa: F401
-    except ImportError:
-        raise Missing("the least that a curve leaves needs SciPy")
-    variants = {"": scenes, ", less the median errors": figures.without_offset(scenes)}
-    if fields:
-        variants[", less what OpenCV's is off by"] = figures.without_field(scenes, fields)
-    for figure, pairs in variants.items():
-        table.add("these three, each alone", "by tenths, least by any curve" + figure, figures.least_flatness([[scene] for scene in pairs]), "")
 
 
 def speed(bench, table, compare_json):
