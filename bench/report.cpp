@@ -3,12 +3,11 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
-#include <sstream>
+#include <nlohmann/json.hpp>
 #include <stdexcept>
 
 #include "commit.h"  // written by the build
@@ -16,6 +15,8 @@
 
 namespace egosgm::bench {
 namespace {
+
+using Json = nlohmann::ordered_json;
 
 [[noreturn]] void refuse(const std::string& message) {
   std::fprintf(stderr, "%s\n", message.c_str());
@@ -51,29 +52,14 @@ std::optional<std::string> value_of(const char* name, int argc, char** argv, int
   return argv[++i];
 }
 
-std::string quoted(const std::string& text) {
-  std::string result = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') result += '\\';
-    result += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
-  }
-  return result + '"';
-}
-
-std::string number(double value) {
-  if (!std::isfinite(value)) return "null";
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%.9g", value);
-  return buffer;
-}
-
-std::string json_of(const Row& row) {
-  std::string text = "{\"name\": " + quoted(row.name) + ", \"width\": " + std::to_string(row.size.width) +
-                     ", \"height\": " + std::to_string(row.size.height) +
-                     ", \"disparities\": " + std::to_string(row.disparities) +
-                     ", \"median_ms\": " + number(row.median_ms);
-  for (const auto& [counter, value] : row.more) text += ", " + quoted(counter) + ": " + number(value);
-  return text + "}";
+Json json_of(const Row& row) {
+  Json json{{"name", row.name},
+            {"width", row.size.width},
+            {"height", row.size.height},
+            {"disparities", row.disparities},
+            {"median_ms", row.median_ms}};
+  for (const auto& [counter, value] : row.more) json[counter] = value;
+  return json;
 }
 
 std::string now() {
@@ -150,17 +136,19 @@ void print_machine(const Machine& machine) {
 }
 
 void write_json(const std::string& file, const Machine& machine, const std::vector<Row>& rows) {
-  std::ostringstream out;
-  out << "{\"device\": " << quoted(machine.device.name) << ",\n \"driver\": " << quoted(machine.device.driver)
-      << ",\n \"version\": " << quoted(machine.device.version)
-      << ",\n \"compute_units\": " << machine.device.compute_units << ",\n \"threads\": " << machine.threads
-      << ",\n \"commit\": " << quoted(EGOSGM_COMMIT) << ",\n \"date\": " << quoted(now())
-      << ",\n \"input\": " << quoted(machine.input) << ",\n \"copy_gb_s\": " << number(machine.copy_gb_s);
-  for (const auto& [name, value] : machine.more) out << ",\n " << quoted(name) << ": " << number(value);
-  out << ",\n \"rows\": [";
-  for (std::size_t i = 0; i < rows.size(); ++i) out << (i ? ",\n  " : "\n  ") << json_of(rows[i]);
-  out << "]}\n";
-  vision::write_file(file, out.str());
+  Json json{{"device", machine.device.name},
+            {"driver", machine.device.driver},
+            {"version", machine.device.version},
+            {"compute_units", machine.device.compute_units},
+            {"threads", machine.threads},
+            {"commit", EGOSGM_COMMIT},
+            {"date", now()},
+            {"input", machine.input},
+            {"copy_gb_s", machine.copy_gb_s}};
+  for (const auto& [name, value] : machine.more) json[name] = value;
+  json["rows"] = Json::array();
+  for (const Row& row : rows) json["rows"].push_back(json_of(row));
+  vision::write_file(file, json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
 int guarded(const char* program, int (*main_body)(int, char**), int argc, char** argv) {
