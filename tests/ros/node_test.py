@@ -24,6 +24,23 @@ STREET = dict(frames=RENDERED, width=WIDTH, height=HEIGHT, seed=1, speed_m=0.1, 
 STREET_WITH_A_BUS = dict(frames=3, width=480, height=180, seed=3, moving_object=True, supersampling=1)
 
 
+def infos_of(c, width, height, **more):
+    """The camera infos of a rectified pair: left, right."""
+    from sensor_msgs.msg import CameraInfo
+    k, rest = [c.fx, 0, c.cx, 0, c.fy, c.cy, 0, 0, 1.0], [0, c.fy, c.cy, 0, 0, 0, 1.0, 0]
+    return [CameraInfo(height=height, width=width, distortion_model="plumb_bob", k=k, p=[c.fx, 0, c.cx, -c.fx * c.baseline_m * side, *rest], **{"d": [0.0] * 5, **more})
+            for side in (0, 1)]
+
+
+def image_of(pixels, sec=0):
+    """A grey image."""
+    from sensor_msgs.msg import Image
+    height, width = pixels.shape
+    image = Image(height=height, width=width, step=width, encoding="mono8", data=array.array("B", pixels.tobytes()))
+    image.header.stamp.sec, image.header.frame_id = sec, "left_optical"
+    return image
+
+
 def publish(frames, rate, right_width=WIDTH, reliable=True, tf=False, tells=True, waits=False):
     """Forwards and backwards through the street, once the node has its listeners; tells: its diagnostics name them. tf: where the camera truly
     is, in the frame odom. waits: for the disparities of each pair before the next one, so that the machine may be slow."""
@@ -34,7 +51,6 @@ def publish(frames, rate, right_width=WIDTH, reliable=True, tf=False, tells=True
     from sensor_msgs.msg import CameraInfo, Image
     street = egosgm.SyntheticSequence(**STREET)
     rendered = [street.render(i) for i in range(RENDERED)]
-    c = street.calibration
     rclpy.init()
     node = rclpy.create_node("publisher")
     qos = QoSProfile(depth=100) if reliable else qos_profile_sensor_data
@@ -59,10 +75,7 @@ def publish(frames, rate, right_width=WIDTH, reliable=True, tf=False, tells=True
     turn = 2 * (RENDERED - 1)
     for i in range(-2, frames):  # camera infos alone at first
         stamp = node.get_clock().now().to_msg()
-        for side in (0, 1):
-            info = CameraInfo(height=HEIGHT, width=WIDTH, distortion_model="plumb_bob", d=[0.0] * 5)
-            info.k = [c.fx, 0, c.cx, 0, c.fy, c.cy, 0, 0, 1.0]
-            info.p = [c.fx, 0, c.cx, -c.fx * c.baseline_m * side, 0, c.fy, c.cy, 0, 0, 0, 1.0, 0]
+        for side, info in enumerate(infos_of(street.calibration, WIDTH, HEIGHT)):
             info.header.stamp = stamp
             infos[side].publish(info)
             if i < 0:
@@ -71,8 +84,8 @@ def publish(frames, rate, right_width=WIDTH, reliable=True, tf=False, tells=True
             pixels = frame.right[:, :right_width] if side else frame.left
             if pixels.size == 0:
                 continue  # a camera that is silent
-            image = Image(height=HEIGHT, width=pixels.shape[1], step=pixels.shape[1], encoding="mono8", data=array.array("B", pixels.tobytes()))
-            image.header.stamp, image.header.frame_id = stamp, "left_optical"
+            image = image_of(pixels)
+            image.header.stamp = stamp
             if tf and side == 0:
                 broadcaster.sendTransform(transform_of(image.header, "odom", frame.world_from_camera))
             images[side].publish(image)
@@ -301,6 +314,19 @@ class Parameters(unittest.TestCase):
         self.addCleanup(node.destroy_node)
         return node
 
+    def tiny_node(self, **parameters):
+        """Configured, with the infos of images of 64x32."""
+        node = self.node(disparities=16, **parameters)
+        node.trigger_configure()
+        self.inform(node, 100.0)
+        return node
+
+    @staticmethod
+    def inform(node, focal, **more):
+        import egosgm
+        for side, info in zip(("left", "right"), infos_of(egosgm.Calibration(focal, focal, 32, 16, 1), 64, 32, **more)):
+            node._on_info(side, info)
+
     def assert_runs_with(self, node, preset, **changed):
         import egosgm
         calibration = egosgm.Calibration(100, 100, 32, 32, 0.1)
@@ -370,24 +396,18 @@ class Parameters(unittest.TestCase):
     def process_street_with_a_bus(self, topics, frames=3, **parameters):
         """The node, and for each topic what it published of each frame: the real node's work, without the middleware."""
         import egosgm
-        from sensor_msgs.msg import CameraInfo, Image
         street = egosgm.SyntheticSequence(**STREET_WITH_A_BUS)
-        c = street.calibration
         node = self.node(disparities=64, paths=4, **parameters)
         node.trigger_configure()
-        for side, shift in (("left", 0), ("right", -c.fx * c.baseline_m)):
-            node._on_info(side, CameraInfo(height=180, width=480, k=[c.fx, 0, c.cx, 0, c.fy, c.cy, 0, 0, 1.0], p=[c.fx, 0, c.cx, shift, 0, c.fy, c.cy, 0, 0, 0, 1.0, 0]))
+        for side, info in zip(("left", "right"), infos_of(street.calibration, 480, 180)):
+            node._on_info(side, info)
         node._listened_to = lambda: set(topics)
         sent = {topic: [] for topic in topics}
         for topic in topics:
             node._outputs[topic] = type("Publisher", (), dict(publish=sent[topic].append))
         for i in range(frames):
-            images = []
-            for pixels in (street.render(i).left, street.render(i).right):
-                image = Image(height=180, width=480, step=480, encoding="mono8", data=array.array("B", pixels.tobytes()))
-                image.header.stamp.sec, image.header.frame_id = i + 1, "left_optical"
-                images.append(image)
-            node._process(*images)
+            frame = street.render(i)
+            node._process(image_of(frame.left, i + 1), image_of(frame.right, i + 1))
         return node, sent
 
     @staticmethod
@@ -486,13 +506,11 @@ class Parameters(unittest.TestCase):
 
     def test_the_newest_pair_comes_next(self):
         """Whatever waited meanwhile."""
-        from sensor_msgs.msg import Image
         node = self.node(reliable=True)
         node.trigger_configure()
         node._is_active = True
         for i in range(1, 4):
-            image = Image()
-            image.header.stamp.sec = i
+            image = image_of(np.zeros((1, 1), np.uint8), i)
             for index in (0, 1):
                 node._on_image(index, image)
         self.assertEqual([image.header.stamp.sec for image in node._newest], [3, 3])
@@ -550,15 +568,9 @@ class Parameters(unittest.TestCase):
     def test_compressed_images_are_matched_and_the_info_goes_with_them(self):
         import cv2
         from sensor_msgs.msg import CameraInfo, CompressedImage
-        node = self.node(compressed=True, disparities=16, temporal=False)
-        node.trigger_configure()
+        node = self.tiny_node(compressed=True, temporal=False)
         self.assertEqual([subscription.topic_name for subscription in node._inputs],
                          ["/left/camera_info", "/left/image_rect/compressed", "/right/camera_info", "/right/image_rect/compressed"])
-        for side in (0, 1):
-            info = CameraInfo(height=32, width=64, distortion_model="plumb_bob", d=[0.0] * 5)
-            info.k = [100.0, 0, 32.0, 0, 100.0, 16.0, 0, 0, 1.0]
-            info.p = [100.0, 0, 32.0, -100.0 * side, 0, 100.0, 16.0, 0, 0, 0, 1.0, 0]
-            node._on_info(("left", "right")[side], info)
         sent = []
         node._listened_to = lambda: {"camera_info", "depth", "points2"}
         for name in node._listened_to():
@@ -572,7 +584,6 @@ class Parameters(unittest.TestCase):
         self.assertEqual([message.p[0] for message in sent if isinstance(message, CameraInfo)], [100.0])
 
     def test_stamps_that_do_not_pair_are_told_once_a_minute(self):
-        from sensor_msgs.msg import Image
         node = self.node()
         node.trigger_configure()
         node._is_active = True
@@ -581,8 +592,8 @@ class Parameters(unittest.TestCase):
         node.get_logger().warning = warned.append
         for i in range(3):
             for index in (0, 1):
-                image = Image()
-                image.header.stamp.sec, image.header.stamp.nanosec = i, 385000 * index
+                image = image_of(np.zeros((1, 1), np.uint8), i)
+                image.header.stamp.nanosec = 385000 * index
                 node._on_image(index, image)
             node._waits_since = time.monotonic() - 1 - i
             node._tell()
@@ -593,14 +604,9 @@ class Parameters(unittest.TestCase):
 
     def test_a_pipeline_that_could_not_be_made_is_made_for_the_next_pair(self):
         import egosgm
-        from sensor_msgs.msg import CameraInfo, Image
-        node = self.node(disparities=16)
-        node.trigger_configure()
-        image = Image(height=32, width=64, step=64, encoding="mono8", data=array.array("B", bytes(64 * 32)))
+        node, image = self.tiny_node(), image_of(np.zeros((32, 64), np.uint8))
         for focal in (100.0, 101.0):
-            for side in (0, 1):
-                info = CameraInfo(height=32, width=64, k=[focal, 0, 32.0, 0, focal, 16.0, 0, 0, 1.0], p=[focal, 0, 32.0, -focal * side, 0, focal, 16.0, 0, 0, 0, 1.0, 0])
-                node._on_info(("left", "right")[side], info)
+            self.inform(node, focal)
             image.header.stamp.sec += 1
             before = node._pipeline
             with mock.patch.object(egosgm, "Pipeline", side_effect=egosgm.DeviceError("no memory")), self.assertRaises(egosgm.DeviceError):
@@ -613,22 +619,14 @@ class Parameters(unittest.TestCase):
         self.assertIn("pairs of one stamp, 2.000 s", node._warning)
 
     def test_infos_that_change_and_the_range_that_messages_tell(self):
-        from sensor_msgs.msg import CameraInfo, Image
-        node = self.node(min_disparity=4, disparities=16, temporal=False)
-        node.trigger_configure()
-        sent = []
+        from sensor_msgs.msg import CameraInfo
+        node, sent = self.tiny_node(min_disparity=4, temporal=False), []
         node._listened_to = lambda: {"disparity"}
         node._outputs["disparity"].publish = sent.append
         grey = np.random.default_rng(1).integers(0, 256, (32, 64), dtype=np.uint8)
         for i in range(4):
-            focal = 100.0 + i // 2
-            image = Image(height=32, width=64, step=64, encoding="mono8", data=array.array("B", grey.tobytes()))
-            image.header.stamp.sec = i + 1
-            for side in (0, 1):
-                info = CameraInfo(height=32, width=64, distortion_model="plumb_bob", d=[0.0] * 5)
-                info.k = [focal, 0, 32.0, 0, focal, 16.0, 0, 0, 1.0]
-                info.p = [focal, 0, 32.0, -focal * side, 0, focal, 16.0, 0, 0, 0, 1.0, 0]
-                node._on_info(("left", "right")[side], info)
+            image = image_of(grey, i + 1)
+            self.inform(node, 100.0 + i // 2)
             node._process(image, image)
         self.assertEqual([message.f for message in sent], [100, 100, 101, 101])
         self.assertEqual([(message.min_disparity, message.max_disparity) for message in sent], [(4, 19)] * 4)
@@ -646,8 +644,7 @@ class Parameters(unittest.TestCase):
         for name, lens, is_told in (("image_raw", 0.1, True), ("image_raw", 0.0, False), ("image_rect_color", 0.1, False)):
             node = self.node("--ros-args", "-r", f"left/image_rect:=left/{name}", "-r", f"right/image_rect:=right/{name}", disparities=16, temporal=False)
             node.trigger_configure()
-            for side in ("left", "right"):
-                node._on_info(side, CameraInfo(height=32, width=64, d=[lens] * 5, k=info.k, p=[101.0, 0, 32.0, -101.0 * (side == "right"), *info.p[4:]]))
+            self.inform(node, 101.0, d=[lens] * 5)
             node._process(image, image)
             self.assertEqual("/left/image_raw and /right/image_raw's name and camera info" in node._topics_warning, is_told)
 
