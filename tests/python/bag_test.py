@@ -398,21 +398,6 @@ def test_some_frames_of_a_bag(tmp_path, street, frames, capfd):
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("arguments, named", [
-    (["--out", "x.mcap", "--write", "color"], "--write, --interpolate and --resume are for a folder"), (["--out", "x", "street"], "more than one input"),
-    ([], "--out is required")])
-def test_what_does_not_go_together(arguments, named, tmp_path, street, frames, capfd, monkeypatch):
-    bag = record("mcap", tmp_path / "drive", street, frames[:1])
-    monkeypatch.chdir(tmp_path)
-    assert bag_program.main(["--bag", str(bag), *TOPICS, *SET, *arguments]) == 2
-    assert named in capfd.readouterr().err and os.listdir(tmp_path) == ["drive"]
-
-
-def test_recordings_of_a_folder(street_folder, tmp_path, capfd):
-    assert bag_program.main([str(street_folder), *SET, "--out", str(tmp_path / "out.mcap")]) == 2
-    assert "have the stamps of a bag" in capfd.readouterr().err
-
-
 def test_python_runs_a_bag(tmp_path, street, frames):
     """As the program does: where time steps back, nothing is predicted."""
     times = [START + i * RATE_NS for i in (50, 51, 1, 2)]
@@ -437,12 +422,6 @@ def test_stamps_pair_within_their_bound_and_gaps_are_told(tmp_path, street, fram
     assert "1 gap, the longest of 1.500 s before frame 2" in text and "steps back 1 times" in text
     with pytest.raises(egosgm.InvalidArgument, match="nearest stamps differ by 2.000 ms: allow that by --max-skew-ms"):
         list(bags.Bag(path, "/left/image_rect", "/right/image_rect").frames())
-    times = [START + ms * 1_000_000 for ms in (0, 100, 110, 200, 212)]  # where two could be paired, the nearer is
-    path = record("mcap", tmp_path / "nearer", street, [frames[i % FRAMES] for i in range(5)], times=times, left_out=[(1, "right"), (3, "left")],
-                  of_right=lambda i, time: time + (0, 0, 2, 0, -2)[i] * 1_000_000)
-    bag = bags.Bag(path, "/left/image_rect", "/right/image_rect", max_skew_ms=15)
-    assert [frame.stamp_ns for frame in bag.frames()] == [times[0], times[2], times[4]]
-    assert "1 left and 1 right images have no partner;" in bag.gaps.text() and "nearest" not in bag.gaps.text()
 
 
 def test_messages_that_were_received_out_of_order(tmp_path, street, frames):
@@ -475,13 +454,16 @@ def test_both_cameras_seen_from_a_third_one(tmp_path, street, frames):
             assert bag.cameras.calibration.baseline_m == pytest.approx(c.baseline_m)
 
 
+@pytest.mark.parametrize("offset", (0, 200))
 @pytest.mark.parametrize("rectify", (False, True))
-def test_binned_images_have_the_calibration_of_their_pixels(rectify, tmp_path, street, frames):
-    """The info is then of the sensor's pixels: here two columns and three rows make one."""
-    def binned(info):
-        info.width, info.height, info.binning_x, info.binning_y = 2 * WIDTH, 3 * HEIGHT, 2, 3
-        info.k, info.p = (np.diag([2.0, 3, 1]) @ info.k.reshape(3, 3)).reshape(-1), (np.diag([2.0, 3, 1]) @ info.p.reshape(3, 4)).reshape(-1)
-    bag = bags.Bag(drive_of(street, frames[:1], binned).write(tmp_path / "drive"), "/left/image_rect", "/right/image_rect", rectify=rectify)
+def test_binned_and_cropped_images_have_the_calibration_of_their_pixels(rectify, offset, tmp_path, street, frames):
+    """The info is then of the sensor's pixels: here two columns and three rows make one, and the region begins so many columns to the right."""
+    def whole_sensor(info):
+        info.width, info.height, info.binning_x, info.binning_y = 2 * WIDTH + 2 * offset, 3 * HEIGHT, 2, 3
+        finer = np.array([[2.0, 0, offset], [0, 3, 0], [0, 0, 1]])
+        info.k, info.p = (finer @ info.k.reshape(3, 3)).reshape(-1), (finer @ info.p.reshape(3, 4)).reshape(-1)
+        info.roi.x_offset, info.roi.width, info.roi.height = (offset, 2 * WIDTH, 3 * HEIGHT) if offset else (0, 0, 0)
+    bag = bags.Bag(drive_of(street, frames[:1], whole_sensor).write(tmp_path / "drive"), "/left/image_rect", "/right/image_rect", rectify=rectify)
     frame, = bag.frames()
     for name in ("fx", "fy", "cx", "cy", "baseline_m"):
         assert getattr(bag.cameras.calibration, name) == pytest.approx(getattr(street.calibration, name), abs=1e-4)
@@ -776,18 +758,6 @@ def test_wrong_arguments_are_refused_by_name(change, named, tmp_path, street, fr
         bags.Bag(path, **{**dict(left_topic="/left/image_rect", right_topic="/right/image_rect"), **change})
 
 
-def test_wrong_files_and_options_leave_nothing(tmp_path, street, frames):
-    path = record("mcap", tmp_path / "drive", street, frames[:1])
-    (tmp_path / "broken.mcap").write_bytes(path.read_bytes()[:200])
-    for arguments, named in ((["--bag", tmp_path / "none.mcap", *TOPICS], "no such file"), (["--bag", tmp_path / "broken.mcap", *TOPICS], "broken.mcap: cannot be read as a bag"),
-                             (["--bag", path, *TOPICS, "--set", "p22=3"], "choose from"), (["--bag", path, *TOPICS, "--set", "p2"], "NAME=VALUE"),
-                             (["--bag", path, *TOPICS, "--out", tmp_path / "no/x.mcap"], "no such folder")):
-        told = program(*arguments, *([] if "--out" in arguments else ["--out", tmp_path / "out.mcap"]))
-        assert told.returncode == 2 and told.stderr.startswith("egosgm: error: ") and told.stderr.count("\n") == 1, told.stderr
-        assert named in told.stderr
-        assert sorted(os.listdir(tmp_path)) == ["broken.mcap", "drive"]
-
-
 def refused(capfd, arguments, *named, code=2):
     """One line on the standard error."""
     out = [] if "--out" in arguments else ["--out", "/nowhere"]
@@ -813,6 +783,7 @@ def of_pose(**fields):
     ("/left/image_rect", changed(width=2**32 - 1, step=2**32 - 1), "4294967295"), ("/left/image_rect", changed(width=0), "an image of 0x96 px"),
     ("/left/image_rect", changed(height=0), "x0 px"), ("/left/image_rect", changed(height=HEIGHT - 1), "320x95 px, while the camera info is of 320x96"),
     ("/left/image_rect", changed(encoding="bayer_rgbg8"), "bayer_rgbg8"), ("/left/image_rect", changed(encoding="mono16", width=WIDTH // 2), "160x96"),
+    ("/left/camera_info", changed(p=np.array([100.0, 52, 160, 0, 0, 100, 48, 0, 0, 0, 1, 0])), "/left/camera_info: P of the camera info has a skew of 52 px"),
     ("/left/camera_info", changed(p=np.zeros(12)), "not calibrated"), ("/right/camera_info", changed(p=np.full(12, np.nan)), "P of the camera info holds a value that is not finite"),
     ("/left/camera_info", changed(width=0, height=0), "is of 0x0"), ("/left/camera_info", changed(d=np.full(5, np.nan)), "D of the camera info holds a value that is not finite"),
     ("/odom", of_pose(x=0.0, y=0.0, z=0.0, w=0.0), "no rotation"), ("/odom", of_pose(at_x=np.nan), "pose 0 is not finite"), ("/odom", of_pose(w=np.inf), "pose 0 is not finite")])
@@ -915,13 +886,20 @@ sys.exit(bag_program.main(sys.argv[1:]))"""
 
 
 @pytest.mark.parametrize("arguments, named", [
-    (["--set", "device=0"], "device"), (["--set", "bag=1"], "bag"), (["--set", "width=1"], "width"), (["--set", "disparities=many"], "disparities"), (["--set", "disparities=1.5"], "disparities"),
-    (["--max-skew-ms", "inf"], "--max-skew-ms inf"), (["--max-skew-ms", "x"], "--max-skew-ms"), (["--skew", "1"], "--skew"), (["--preset", "papr"], "papr"),
-    (["--left-topic"], "--left-topic"), (["--rectify", "maybe"], "maybe"), (["--device", "abacus"], "abacus"), (["--set", "constants.none=1"], "none")])
-def test_wrong_arguments_of_the_program_are_one_line(arguments, named, tmp_path, street, frames, capfd):
-    bag = record("mcap", tmp_path / "drive", street, frames[:1])
-    refused(capfd, ["--bag", bag, *TOPICS, "--out", tmp_path / "out.mcap", *SET, *arguments], named)
+    (["--set", "bag=1"], "choose from"), (["--max-skew-ms", "inf"], "--max-skew-ms inf"), (["--max-skew-ms", "x"], "--max-skew-ms"), (["--rectify", "maybe"], "maybe"),
+    (["--bag", "none.mcap"], "no such file"), (["--out", "no/x.mcap"], "no such folder"), (["--out", ""], "--out"),
+    (["--out", "x.mcap", "--write", "color"], "--write, --interpolate and --resume are for a folder"), (["street"], "more than one input")])
+def test_wrong_arguments_of_the_program_are_one_line(arguments, named, tmp_path, street, frames, capfd, monkeypatch):
+    """What all input has in common, the tests of the program say."""
+    monkeypatch.chdir(tmp_path)
+    given = {"--bag": record("mcap", tmp_path / "drive", street, frames[:1]), "--out": "out.mcap", **dict(zip(arguments[::2], arguments[1::2]))}
+    words = [word for pair in given.items() for word in pair] if len(arguments) % 2 == 0 else ["--bag", given["--bag"], "--out", "out.mcap", *arguments]
+    refused(capfd, [*words, *TOPICS, *SET], named)
     assert os.listdir(tmp_path) == ["drive"]
+
+
+def test_a_recording_needs_a_bag(street_folder, tmp_path, capfd):
+    refused(capfd, [street_folder, *SET, "--out", tmp_path / "out.mcap"], "have the stamps of a bag")
 
 
 def test_a_silent_camera_costs_no_memory():
@@ -952,46 +930,10 @@ def rescaled(factor):
 
 def test_warnings_of_a_baseline(tmp_path, street, frames, capfd):
     assert "doctor" not in told_of(capfd, drive_of(street, frames).write(tmp_path / "good"))
-    cases = (("cm", 100, "centimetres (0.54 m)"), ("mm", 1000, "millimetres (0.54 m)"), ("no_fx", 1 / street.calibration.fx, "is fx missing"))
-    for name, factor, named in cases:
-        said = told_of(capfd, drive_of(street, frames, rescaled(factor)).write(tmp_path / name))
-        assert f"`egosgm doctor --bag {tmp_path}" in said and named in said
+    said = told_of(capfd, drive_of(street, frames, rescaled(1 / street.calibration.fx)).write(tmp_path / "no_fx"))
+    assert f"`egosgm doctor --bag {tmp_path}" in said and "is fx missing" in said
     path = drive_of(street, frames, rescaled(3)).write(tmp_path / "wide")
     assert "few rigs are wider than a metre" in told_of(capfd, path) and examined(capfd, path)["calibration"]["verdict"] == "note"
-
-
-def test_binned_and_cropped_cameras_are_what_ros_says(tmp_path, street, frames, capfd):
-    c = street.calibration
-
-    def whole_sensor(info):
-        """Of a sensor four times as fine, of which the image is binned; it begins 200 pixels to the right, and is cropped."""
-        k, p = np.array(info.k), np.array(info.p)
-        k[:6] *= 4
-        p[:8] *= 4
-        k[2] += 200
-        p[2] += 200
-        info.k, info.p, info.width, info.height, info.binning_x, info.binning_y = k, p, 4 * WIDTH + 400, 4 * HEIGHT, 4, 4
-        info.roi.x_offset, info.roi.width, info.roi.height = 200, 4 * WIDTH, 4 * HEIGHT
-
-    bag = bags.Bag(drive_of(street, frames, whole_sensor).write(tmp_path / "whole"), "/left/image_rect", "/right/image_rect")
-    assert len(list(bag.frames())) == FRAMES
-    found = bag.cameras.calibration
-    assert [found.fx, found.cx, found.cy, found.baseline_m] == pytest.approx([c.fx, c.cx, c.cy, c.baseline_m])
-
-    def binned_already(info):
-        info.binning_x = info.binning_y = 4
-        info.width, info.height = 4 * WIDTH, 4 * HEIGHT
-
-    said = told_of(capfd, drive_of(street, frames, binned_already).write(tmp_path / "binned"))
-    assert "the principal point is far from the middle" in said
-
-
-def test_a_skew_is_refused(tmp_path, street, frames, capfd):
-    def skewed(info):
-        p = np.array(info.p)
-        p[1] = 52
-        info.p = p
-    refused(capfd, ["--bag", drive_of(street, frames, skewed).write(tmp_path / "drive"), *TOPICS, *SET], "/left/camera_info", "a skew of 52 px")
 
 
 def test_other_moments_get_no_advice(tmp_path, street, frames, capfd):
