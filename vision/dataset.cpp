@@ -37,11 +37,15 @@ void require_folder(const fs::path& folder, const std::string& remedy) {
     throw InvalidArgument(folder.string() + ": is no folder; " + kind);
   }
   std::error_code error;
-  if (!fs::exists(folder, error)) throw MissingPath(folder.string(), "no such folder; " + remedy);
+  if (!fs::exists(folder, error)) {
+    const bool is_link = fs::is_symlink(fs::symlink_status(folder, error));
+    throw MissingPath(folder.string(), (is_link ? "is a link to what is not there; " : "no such folder; ") + remedy);
+  }
   throw InvalidArgument(folder.string() + ": is no folder; " +
-                        (is_image_name(folder)
-                             ? "give --left PATTERN --right PATTERN --calib FILE, patterns in quotes, or " + remedy
-                             : remedy));
+                        (is_image_name(folder) ? "give both pictures of a pair, LEFT RIGHT, or --left PATTERN --right "
+                                                 "PATTERN --calib FILE, patterns in quotes, or " +
+                                                     remedy
+                                               : remedy));
 }
 
 /// The folders of left and right images, and whose calibration they need.

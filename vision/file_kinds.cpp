@@ -49,7 +49,8 @@ bool is_bag(const fs::path& path) {
 bool is_own_calibration(const fs::path& path) {
   static const std::regex kRow(R"((^|\n)[ \t]*(P_rect_\d|P[0-3][ \t]*:(?![ \t]*!!)|cam0[ \t]*=|baseline_m\b))");
   const std::string text = start_of(path);
-  return !text.starts_with("%YAML") && std::regex_search(text, kRow);
+  const bool is_text = text.find('\0') == std::string::npos;  // an archive may hold one as it is
+  return is_text && !text.starts_with("%YAML") && std::regex_search(text, kRow);
 }
 
 }  // namespace egosgm::vision

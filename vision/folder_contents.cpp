@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "egosgm/error.h"
+#include "vision/file_io.h"
+#include "vision/foreign_file.h"
 #include "vision/frame_names.h"
 
 namespace egosgm::vision {
@@ -199,10 +201,16 @@ Contents videos(const fs::path& folder) {
   for (const char* type : {".mp4", ".avi", ".mkv", ".mov"}) {
     const fs::path left = folder / ("left" + std::string(type)), right = folder / ("right" + std::string(type));
     if (is_file(left) && is_file(right))
-      return "it holds two videos: egosgm rectify --left '" + left.string() + "' --right '" + right.string() +
-             "' --calib FILE makes a sequence of them";
+      return "it holds two videos: give '" + left.string() + "' '" + right.string() + "' --calib FILE";
   }
-  return std::nullopt;
+  const std::vector<std::string> names = names_in(folder);
+  if (names.size() > kMostFolders) return std::nullopt;
+  std::vector<fs::path> found;
+  for (const std::string& name : names) {
+    if (is_video(folder / name)) found.push_back(folder / name);
+  }
+  if (found.size() != 1) return std::nullopt;
+  return "it holds a video: give '" + found.front().string() + "' --calib FILE";
 }
 
 /// Names of the folders of both cameras: the usual ones, then any with left or right in it that holds
@@ -222,15 +230,38 @@ std::vector<std::pair<std::string, std::string>> names_of_cameras(const fs::path
   return names;
 }
 
+/// Folders of both cameras without an image that is read.
+Contents cameras_without_images(const fs::path& folder) {
+  for (const auto& [left, right] : names_of_cameras(folder)) {
+    if (!holds_both(folder, left, right)) continue;
+    const std::string text = "its folders " + left + " and " + right + " hold no images that are PNG or JPEG";
+    const std::vector<std::string> names = names_in(folder / left);
+    if (names.empty()) return text + ": " + left + " is empty";
+    const fs::path first = folder / left / names.front();
+    const std::string kind = is_file(first) ? foreign_kind(read_file_start(first, kKindBytes), first) : "";
+    return text + ", but " + left + "/" + names.front() +
+           (kind.empty() ? ": `egosgm rectify` makes a sequence of images of other kinds" : ": " + kind);
+  }
+  return names_in(folder).empty() ? Contents("it is empty") : std::nullopt;
+}
+
 /// The left and the right image of a pair, by their names; nothing where there are none, or several.
 std::optional<std::pair<std::string, std::string>> pair_in(const fs::path& folder) {
   const std::vector<std::pair<std::string, std::string>> pairs = pairs_in(folder);
   return pairs.size() == 1 ? std::optional(pairs.front()) : std::nullopt;
 }
 
-/// Pairs that have a folder each, or the pair that `folder` holds.
+/// Pairs that have a folder each, or those that `folder` holds, whose names differ by a number alone.
 std::optional<TwoCameras> find_pairs_in(const fs::path& folder) {
-  if (const auto pair = pair_in(folder)) return TwoCameras{folder / pair->first, folder / pair->second, {}};
+  const std::vector<std::pair<std::string, std::string>> pairs = pairs_in(folder);
+  const auto pattern_of = [](const auto& pair) {
+    return std::pair(without_number(pair.first), without_number(pair.second));
+  };
+  if (!pairs.empty() && std::all_of(pairs.begin(), pairs.end(),
+                                    [&](const auto& pair) { return pattern_of(pair) == pattern_of(pairs[0]); })) {
+    const auto [left, right] = pattern_of(pairs[0]);
+    return TwoCameras{folder / left, folder / right, {}};
+  }
   for (const fs::path& child : folders_in(folder)) {
     if (const auto pair = pair_in(child))
       return TwoCameras{folder / "*" / pair->first, folder / "*" / pair->second, {}};
@@ -248,7 +279,7 @@ Contents result_of_a_run(const fs::path& folder) {
 
 Contents found_instead(const fs::path& folder) {
   for (const auto& look : {multiview, sequences_below, euroc, videos, result_of_a_run, two_cameras, both_cameras,
-                           one_camera, folders_of_images}) {
+                           one_camera, folders_of_images, cameras_without_images}) {
     if (Contents found = look(folder)) return found;
   }
   return std::nullopt;
@@ -257,18 +288,19 @@ Contents found_instead(const fs::path& folder) {
 std::optional<TwoCameras> find_two_cameras(const fs::path& folder) {
   if (result_of_a_run(folder)) return std::nullopt;  // whose right maps are no images
   std::optional<TwoCameras> cameras;
-  bool is_empty = false;
   for (const auto& [left, right] : names_of_cameras(folder)) {
     if (!holds_both(folder, left, right)) continue;
+    if (!holds_images(folder / left)) return std::nullopt;
     cameras = {pattern_in(folder / left, "left"), pattern_in(folder / right, "right"), {}};
-    is_empty = !holds_images(folder / left);
     break;
   }
   if (!cameras) cameras = find_pairs_in(folder);
-  for (const char* name : {"calib.txt", "calibration.txt"}) {
-    if (cameras && cameras->calibration.empty()) cameras->calibration = is_file(folder / name) ? folder / name : "";
+  for (const std::string& name : cameras ? names_in(folder) : std::vector<std::string>()) {
+    const std::string known = lower(name);
+    const bool is_calibration = (known == "calib.txt" || known == "calibration.txt") && is_file(folder / name);
+    if (is_calibration && cameras->calibration.empty()) cameras->calibration = folder / name;
   }
-  return is_empty && cameras->calibration.empty() ? std::nullopt : cameras;
+  return cameras;
 }
 
 fs::path foreign_calibration(const fs::path& folder, const TwoCameras& cameras) {

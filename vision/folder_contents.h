@@ -14,8 +14,8 @@ namespace egosgm::vision {
 /// one of them". Nothing where nothing is known. Thread-safe.
 std::optional<std::string> found_instead(const std::filesystem::path& folder);
 
-/// A folder with one folder of images for each camera, or with one for each pair, or a pair itself; beside them their
-/// calibration, calib.txt or calibration.txt.
+/// A folder with one folder of images for each camera, or with one for each pair, or the pairs themselves; beside them
+/// their calibration, calib.txt or calibration.txt in any case.
 struct TwoCameras {
   std::string left, right;            // their patterns
   std::filesystem::path calibration;  // empty where there is none
@@ -24,7 +24,8 @@ struct TwoCameras {
 /// left and right, cam0 and cam1, L and R, or others with left and right in their names in `folder`; nothing where they
 /// are not both there.
 /// Files that say so in their names too (left_1.png, 1_left.png) are paired by the rest of them. Else left.png and
-/// right.png, or others with left and right in their names, in `folder` or in each folder in it. Thread-safe.
+/// right.png, or others with left and right in their names, in `folder`, where numbers tell the pairs apart, or one
+/// pair in each folder in it. Thread-safe.
 EGOSGM_EXPORT std::optional<TwoCameras> find_two_cameras(const std::filesystem::path& folder);
 
 /// The only file beside the images that may be their calibration, of another name or format than calib.txt; empty where

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <initializer_list>
+#include <set>
 #include <string_view>
 #include <system_error>
 
@@ -18,6 +19,8 @@ namespace fs = std::filesystem;
 
 constexpr const char* kRectify = ", which `egosgm rectify` reads, with the cameras' calibration";
 constexpr const char* kVideo = "it is a video, which `egosgm run` and `rectify` read, with the cameras' calibration";
+constexpr const char* kNoVideo =
+    "it is named as a video, and does not begin like one: is it damaged, or another file under this name?";
 constexpr const char* kLive = "it names a live camera, which `egosgm live` reads; in Python, egosgm.live.LivePairs";
 
 constexpr const char* kWeb =
@@ -28,6 +31,12 @@ std::string archive(const char* kind) {
   return std::string("it is ") + kind + ": unpack it, and give the folder that it holds";
 }
 
+bool is_named_as_video(const fs::path& file) {
+  static const std::set<std::string> kExtensions{".mp4", ".m4v",  ".mov", ".avi", ".mkv", ".webm",
+                                                 ".wmv", ".mpeg", ".mpg", ".flv", ".3gp"};
+  return kExtensions.contains(lower(file.extension().string()));
+}
+
 bool names_a_camera(const fs::path& path) {
   const std::string text = path.string();
   return text.find("://") != std::string::npos || text.starts_with("/dev/video") || text.starts_with("/dev/v4l") ||
@@ -36,7 +45,7 @@ bool names_a_camera(const fs::path& path) {
 
 }  // namespace
 
-std::string foreign_kind(std::string_view start) {
+std::string foreign_kind(std::string_view start, const fs::path& file) {
   using std::string_view_literals::operator""sv;
   struct Kind {
     std::size_t at;
@@ -84,14 +93,14 @@ std::string foreign_kind(std::string_view start) {
   for (const Kind& kind : kinds) {
     if (start.size() > kind.at && start.substr(kind.at).starts_with(kind.bytes)) return kind.meaning;
   }
-  return {};
+  return is_named_as_video(file) ? kNoVideo : "";
 }
 
 bool is_video(const fs::path& file) {
   std::error_code error;
   if (!fs::is_regular_file(file, error)) return false;
   try {
-    return foreign_kind(read_file_start(file, kKindBytes)) == kVideo;
+    return foreign_kind(read_file_start(file, kKindBytes), file) == kVideo;
   } catch (const Error&) {  // it cannot be read, as its reader will say
     return false;
   }
@@ -103,6 +112,8 @@ std::string foreign_input(const fs::path& path) {
   if (!fs::is_regular_file(status)) {
     const std::string text = path.string();
     if (text.starts_with("http://") || text.starts_with("https://")) return kWeb;
+    if (text.starts_with("file://")) return "it is an address: give the path alone, " + text.substr(7);
+    if (text.starts_with('~')) return "a shell alone knows ~ as the home folder: write its path out";
     if (names_a_camera(path)) return kLive;
     const bool is_pattern = text.find('*') != std::string::npos || text.find("%0") != std::string::npos;
     return is_pattern ? "it is a pattern: give --left PATTERN --right PATTERN --calib FILE, patterns in quotes" : "";
@@ -133,7 +144,7 @@ std::string foreign_input(const fs::path& path) {
     }
   }
   try {
-    return foreign_kind(read_file_start(path, kKindBytes));
+    return foreign_kind(read_file_start(path, kKindBytes), path);
   } catch (const Error&) {  // it cannot be read, and is no folder anyway
     return {};
   }

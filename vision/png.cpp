@@ -9,6 +9,7 @@
 #include <cstring>
 #include <string>
 
+#include "egosgm/error.h"
 #include "egosgm/vision/image_io.h"
 #include "vision/foreign_file.h"
 #include "vision/image_bounds.h"
@@ -99,8 +100,9 @@ bool starts_like_png(std::string_view bytes) { return bytes.starts_with(kSignatu
 Size parse_png_size(std::string_view bytes, const std::filesystem::path& file) {
   if (bytes.empty()) refuse_image(file, "the file is empty");
   if (!starts_like_png(bytes)) {
-    const std::string kind = foreign_kind(bytes);
-    refuse_image(file, kind.empty() ? "it does not start like a PNG" : kind);
+    const std::string kind = foreign_kind(bytes, file);
+    if (kind.empty()) refuse_image(file, "it does not start like a PNG");
+    throw InvalidArgument(file.string() + ": is no PNG or JPEG; " + kind);
   }
   if (bytes.size() < kPngHeaderBytes) refuse_image(file, "the file ends in its header");
   if (bytes.substr(12, 4) != "IHDR") refuse_image(file, "its header is damaged");

@@ -360,7 +360,8 @@ TEST_F(DatasetTest, AFolderOfAnotherLevelIsNamedWithWhatItHolds) {
   expect_refused([&] { open_folder(root_ / "alone/0"); }, {"images of its own"});
   expect_refused([&] { open_folder(root_ / "rec"); }, {"egosgm rectify --euroc"});
   expect_refused([&] { open_folder(root_ / "out"); }, {"egosgm run"});
-  expect_refused([&] { open_folder(root_ / "own/left/1.png"); }, {"is no folder", "--left PATTERN", "quotes"});
+  expect_refused([&] { open_folder(root_ / "own/left/1.png"); },
+                 {"is no folder", "LEFT RIGHT", "--left PATTERN", "quotes"});
   expect_refused([&] { open_kitti_multiview(root_ / "odo", "7"); }, {"it holds sequences/00"});
 }
 
@@ -378,7 +379,9 @@ TEST_F(DatasetTest, TwoFoldersOfImagesAndTheirCalibrationAreASequence) {
   expect_refused([&] { open_folder(root_); }, {"it holds a: give"});
   add_text("videos/left.mp4", "x"), add_text("videos/right.mp4", "x");
   expect_refused([&] { open_folder(root_ / "videos"); },
-                 {"it holds two videos: egosgm rectify --left", "left.mp4' --right", "right.mp4' --calib FILE"});
+                 {"it holds two videos: give '", "left.mp4' '", "right.mp4' --calib FILE"});
+  add_text("video/one.avi", "RIFF....AVI LIST"), add_text("video/notes.md", "x");
+  expect_refused([&] { open_folder(root_ / "video"); }, {"it holds a video: give '", "video/one.avi'"});
 
   add_images({"b/image_left/000001_left", "b/image_right/000001_right"}),
       add_text("b/calibration.txt", kOwnCalibration);
@@ -400,7 +403,13 @@ TEST_F(DatasetTest, TwoFoldersOfImagesAndTheirCalibrationAreASequence) {
   EXPECT_EQ(open_folder(root_ / "g").frames[0].right, root_ / "g/cam_Right/1.png");
   EXPECT_EQ(numbers_of(open_folder(root_ / "h")), (std::vector<int>{1}));
   add_text("f/left/1.pgm", "x"), add_text("f/right/1.pgm", "x"), add_text("f/calib.txt", kOwnCalibration);
-  expect_refused([&] { open_folder(root_ / "f"); }, {"holds no images that are PNG or JPEG", "egosgm rectify"});
+  expect_refused([&] { open_folder(root_ / "f"); },
+                 {"its folders left and right hold no images that are PNG or JPEG, but left/1.pgm", "egosgm rectify"});
+  add_text("i/left/1.npy", "\x93NUMPY"), add_text("i/right/1.npy", "\x93NUMPY");
+  expect_refused([&] { open_folder(root_ / "i"); }, {"left and right hold no images", "left/1.npy: it is an array"});
+  for (const char* empty : {"j/left", "j/right", "k"}) std::filesystem::create_directories(root_ / empty);
+  expect_refused([&] { open_folder(root_ / "j"); }, {"left and right hold no images", "left is empty"});
+  expect_refused([&] { open_folder(root_ / "k"); }, {"k: is no stereo sequence; it is empty"});
   add_text("e/calib.txt", "nothing\n");
   expect_refused([&] { open_folder(root_ / "e"); }, {"e/calib.txt"});
 }
@@ -428,11 +437,14 @@ TEST_F(DatasetTest, PairsMayHaveAFolderEach) {
   expect_refused([&] { open_folder(root_ / "c"); }, {"no stereo sequence"});
 }
 
-TEST_F(DatasetTest, ImagesOfBothCamerasAreNamedWhereverTheyAre) {
+TEST_F(DatasetTest, ImagesOfBothCamerasAreReadOrNamedWhereverTheyAre) {
   add_images({"a/left00", "a/left01", "a/right00", "a/right01", "b/000_L", "b/000_R", "b/001_L", "b/001_R"});
+  EXPECT_EQ(open_folder(root_ / "a").frames[1].right, root_ / "a/right01.png");
+  EXPECT_EQ(numbers_of(open_folder(root_ / "b")), (std::vector<int>{0, 1}));
+  add_text("b/Calib.TXT", kOwnCalibration), add_images({"a/left_mask00", "a/right_mask00"});
+  EXPECT_DOUBLE_EQ(open_folder(root_ / "b").calibration.baseline_m, 0.5);
   expect_refused([&] { open_folder(root_ / "a"); },
                  {"holds images of both cameras", "a/left*.png' --right", "a/right*.png'"});
-  expect_refused([&] { open_folder(root_ / "b"); }, {"b/*_L.png' --right", "b/*_R.png'"});
   add_images({"c/camera_0/1", "c/camera_1/1", "d/0/data/1", "d/1/data/1", "d/2/data/1"});
   expect_refused([&] { open_folder(root_ / "c"); },
                  {"its folders camera_0 and camera_1 hold images", "c/camera_0/*' --right"});
@@ -477,11 +489,23 @@ TEST_F(DatasetTest, WhatIsGivenInPlaceOfAFolderIsNamed) {
     add_text(name, "PK\x03\x04");
     expect_refused([&, file = root_ / name] { open_folder(file); }, {name, named});
   }
+  for (const char* name : {"drive.mp4", "DRIVE.MOV"}) {
+    add_text(name, "no video");
+    expect_refused([&] { open_folder(root_ / name); }, {name, "it is named as a video, and does not begin like one"});
+    expect_refused([&] { open_patterns(path(name), path("DSCF0001.MPO"), ""); },
+                   {name, "is no PNG or JPEG; it is named as"});
+  }
+  add_text("drive.zip", std::string("PK\x03\x04\0", 5) + kOwnCalibration);
+  expect_refused([&] { open_folder(root_ / "drive.zip"); }, {"a zip archive: unpack it"});
+  std::filesystem::create_symlink("gone", root_ / "link");
+  expect_refused([&] { open_folder(root_ / "link"); }, {"link: is a link to what is not there"});
   add_text("HD720.svo2", "x");
   expect_refused([&] { open_folder(root_ / "HD720.svo2"); }, {"recording of a ZED", "ZED_SVO_Export"});
   for (const char* camera : {"0", "/dev/video77", "rtsp://camera/left"}) {
     expect_refused([&] { open_folder(camera); }, {camera, "it names a live camera, which `egosgm live` reads"});
   }
+  expect_refused([&] { open_folder("file:///a/drive"); }, {"it is an address: give the path alone, /a/drive"});
+  expect_refused([&] { open_folder("~/drive"); }, {"write its path out"});
   expect_refused([&] { open_folder("https://x.org/drive.zip"); }, {"an address of the web: download"});
   expect_refused([&] { open_folder(root_ / "left/*.png"); }, {"it is a pattern: give --left PATTERN"});
 }

@@ -82,8 +82,9 @@ EGOSGM_EXPORT StereoSequence open_patterns(const std::string& left, const std::s
                                            PairBy pair_by = PairBy::kName);
 
 /// Opens `folder` as whichever of KITTI odometry, KITTI raw or Middlebury it is, or as two folders of images, left and
-/// right (cam0 and cam1, image_left and image_right), or as a folder for each pair with left.png and right.png; with
-/// their calibration, calib.txt or calibration.txt, and poses.txt if there. A calibration of another name is refused.
+/// right (cam0 and cam1, image_left and image_right), or as a folder for each pair with left.png and right.png, or as
+/// one folder with left_1.png, right_1.png and so on; with their calibration, calib.txt or calibration.txt, and
+/// poses.txt if there. A calibration of another name is refused.
 EGOSGM_EXPORT StereoSequence open_folder(const std::filesystem::path& folder, FrameRange range = {});
 
 struct StereoImages {
