@@ -92,9 +92,10 @@ std::optional<Suspicion> suspect_calibration(const Calibration& c, Size size) {
       "give the calibration of images of this size: scale fx, fy, cx, cy as the images were scaled, and subtract what "
       "was cropped from cx, cy";
   const std::string of_size = formatted("%dx%d", size.width, size.height);
-  const double x = c.cx / size.width, y = c.cy / size.height;
+  const double x = (c.cx + 0.5) / size.width, y = (c.cy + 0.5) / size.height;  // the first pixel's middle is 0
   const bool is_off = !is_within(x, kMaxOffBoth) && !is_within(y, kMaxOffBoth);
-  if (is_off && is_within(c.cx / size.height, kMaxOffBoth / 2) && is_within(c.cy / size.width, kMaxOffBoth / 2)) {
+  if (is_off && is_within((c.cx + 0.5) / size.height, kMaxOffBoth / 2) &&
+      is_within((c.cy + 0.5) / size.width, kMaxOffBoth / 2)) {
     return Suspicion{formatted("the principal point (cx %.1f, cy %.1f) is that of images of %dx%d: these of ", c.cx,
                                c.cy, size.height, size.width) +
                          of_size + " are turned by 90 degrees",
@@ -107,7 +108,7 @@ std::optional<Suspicion> suspect_calibration(const Calibration& c, Size size) {
         "the principal point is far from the middle of " + of_size + formatted(" (cx %.1f, cy %.1f)", c.cx, c.cy),
         remedy, is_far};
   }
-  if (!is_within((c.cx + c.doffs_px) / size.width, kMaxOffMiddle)) {
+  if (!is_within((c.cx + 0.5 + c.doffs_px) / size.width, kMaxOffMiddle)) {
     return Suspicion{formatted("with doffs_px %.4g the right principal point is at x %.1f in images of ", c.doffs_px,
                                c.cx + c.doffs_px) +
                          of_size,

@@ -97,6 +97,8 @@ class Doctor(InputTest):
         self.assertIn("--frames :2 and --frames 3:", finding["remedy"])
         (street / "times.txt").write_text("0\n0.1\n0.05\n0.15\n")
         self.assertIn("goes back", self.assert_only_problem("times", street)["text"])
+        (street / "times.txt").write_text("0\n0.1\n0.1\n0.2\n")
+        self.assertIn("frame 000002 has the time of the one before", self.assert_only_problem("times", street)["text"])
         rows = [f"2011-09-{day} {clock}" for day, clock in ((30, "23:59:59.950"), (30, "23:59:59.975"))] + ["2011-10-01 00:00:00.000", "2011-10-01 00:00:00.025"]
         (street / "times.txt").write_text("\n".join(rows))
         self.assertIn("0.025 s", self.examine(street)["times"]["text"])
@@ -107,6 +109,24 @@ class Doctor(InputTest):
         (street / "times.txt").unlink()
         (street.parent / "times.txt").write_text("0\n0.1\n")  # another one's
         self.assertEqual(self.examine(street)["times"]["verdict"], "note")
+
+    def test_small_images_are_too_small_and_nothing_else(self):
+        for height, width in ((5, 7), (8, 8), (24, 32), (62, 100)):
+            street = self.broken_street()
+            for file in (*(street / "image_0").iterdir(), *(street / "image_1").iterdir()):
+                write_grey(file, read_grey(file)[20:20 + height, 100:100 + width])
+            (street / "calib.txt").write_text(f"fx = {width}\nfy = {width}\ncx = {(width - 1) / 2}\ncy = {(height - 1) / 2}\nbaseline_m = 0.5\n")
+            found = self.examine(street)
+            self.assertIn("too small to find points in", found["images"]["text"])
+            self.assertEqual((list(found), found["calibration"]["verdict"]), (["images", "calibration", "times"], "ok"))
+
+    def test_turned_images_are_not_said_to_be_late(self):
+        street = self.broken_street()
+        for file in (*(street / "image_0").iterdir(), *(street / "image_1").iterdir()):
+            write_grey(file, numpy.rot90(read_grey(file)))
+        found = self.examine(street, code=2)
+        self.assertIn("turned by 90 degrees", found["calibration"]["text"])
+        self.assertNotIn("moments", found)
 
     def test_images_of_other_moments_or_of_nothing(self):
         street = self.broken_street()

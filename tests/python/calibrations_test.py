@@ -73,6 +73,7 @@ RECTIFIED = {
     "kalibr_imu.yaml": kalibr(T_cam_imu=SHIFT).replace("cam1:", "cam1:", 1).replace("cam0:\n", f"cam0:\n  T_cam_imu: {np.eye(4).tolist()}\n"),
     "openvins.yaml": kalibr(T_imu_cam=np.linalg.inv(SHIFT).tolist()).replace("cam0:\n", f"cam0:\n  T_imu_cam: {np.eye(4).tolist()}\n"),
     "kalibr_none.yaml": kalibr(model="none", lens=()),
+    "kalibr_of_others.yaml": kalibr().replace("cam1:", "cam2:").replace("cam0:", "cam1:"),
 }
 RAW = {
     "opencv.yml": opencv_yaml(M1=K, D1=LENS, M2=K, D2=LENS, R=EYE, T=[[-B], [0], [0]]),
@@ -370,6 +371,7 @@ def test_a_fisheye(tmp_path):
 
 @pytest.mark.parametrize("text, named", [
     (kalibr(camera_model="omni", T_cn_cnm1=SHIFT), "a camera chain of Kalibr, and cam1 is of the model \"omni\""),
+    (kalibr(T_cn_cnm1=np.linalg.inv(SHIFT).tolist()), "the second camera stands left of the first"), (kalibr().replace("cam1:", "cam3:"), "of one camera: cam1 is missing"),
     (kalibr(rostopic="/right"), "lacks T_cn_cnm1"), (kalibr(model="fov", lens=[1.0]), "the model \"fov\""),
     (f"Camera.fx: {F}\nCamera.fy: {F}\nCamera.cx: {CX}\nCamera.cy: {CY}\n", "ORB-SLAM of one camera: it lacks Stereo.b or Camera.bf"),
     (json.dumps(dict(mtx=K, dist=LENS)), "lacks left_matrix, right_matrix"), ("- 1\n- 2\n", "not `key: value`"), ("a: [1, 2", "no YAML"),

@@ -16,10 +16,17 @@ from .rectification import StereoRig
 Found = Union[StereoRig, _egosgm.Calibration]
 
 
+def cameras_of_chain(data: Dict[str, Any]) -> List[int]:
+    """Numbers of the cameras in a camera chain of Kalibr; none where it is no such chain."""
+    return sorted(int(name[3:]) for name, value in data.items() if re.fullmatch(r"cam\d+", name) and isinstance(value, dict))
+
+
 def kalibr(data: Dict[str, Any], file: pathlib.Path) -> StereoRig:
     chain = Values(data, file, "a camera chain of Kalibr")
     cameras: List[Camera] = []
-    for name in ("cam0", "cam1"):
+    number = cameras_of_chain(data)[0]
+    left, right = f"cam{number}", f"cam{number + 1}"
+    for name in (left, right):
         if not isinstance(data.get(name), dict):
             raise chain.refuse(f" of one camera: {name} is missing")
         camera = chain.part(data[name])
@@ -30,7 +37,7 @@ def kalibr(data: Dict[str, Any], file: pathlib.Path) -> StereoRig:
         if numbers is not None and numbers.size > 4 and numbers.any():
             raise chain.refuse(f", and distortion_coeffs of {name} are {numbers.size} numbers, not 4: does a decimal comma part one of them?")
         cameras.append((of_four(camera.matrix((4,), "intrinsics", "camera_matrix")), *lens))
-    first, second = chain.part(data["cam0"]), chain.part(data["cam1"])
+    first, second = chain.part(data[left]), chain.part(data[right])
     if "T_cn_cnm1" in second.data:
         right_from_left = second.matrix((4, 4), "T_cn_cnm1")
     elif "T_cam_imu" in second.data and "T_cam_imu" in first.data:

@@ -15,7 +15,7 @@ from .. import _egosgm
 from . import formats
 from . import parts
 from .formats import Found
-from .rectification import StereoRig
+from .rectification import StereoRig, expect_side_by_side
 
 _Path = Union[str, "os.PathLike[str]"]
 _Reader = TypeVar("_Reader", bound=Callable[..., Any])
@@ -70,7 +70,7 @@ def _of_data(data: Any, file: pathlib.Path, is_fisheye: bool, size: Optional[Tup
     if not isinstance(data, dict):
         raise parts.refuse(file, "holds no names with values: it is no calibration that is known")
     flat = {str(key): value for key, value in data.items()}
-    if isinstance(flat.get("cam0"), dict):
+    if formats.cameras_of_chain(flat):
         return formats.kalibr(flat, file)
     if "T_BS" in flat or formats.is_info(flat):
         return _of_two_files(list(_other_side(file)), size)
@@ -255,6 +255,10 @@ def find(file: "_Path | Sequence[_Path]", unit_m: Optional[float] = None, is_fis
         if warning and warning.is_certain:
             raise parts.refuse(path, f"T gives {warning.what}: {warning.remedy} Give --unit cm or --unit mm (unit_m 0.01 or 0.001), whichever it is; the side of a square in metres where T "
                                 "counts a board's squares (--unit 0.025, unit_m 0.025); or --unit m (unit_m 1) where it is right")
+    try:
+        expect_side_by_side(np.ravel(found.T))
+    except _egosgm.InvalidArgument as error:
+        raise parts.refuse(path, str(error)) from None
     calibration = _without_rectification(found)
     if calibration is not None:
         parts.expect_size(found.size, size, path)

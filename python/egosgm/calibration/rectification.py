@@ -90,7 +90,8 @@ def _check_rotation(name: str, rotation: Any) -> None:
         raise _egosgm.InvalidArgument(f"{name} is no rotation: its rows are not of length 1 and at right angles; give the calibration as it was computed")
 
 
-def _check_stance(translation: _Matrix) -> None:
+def expect_side_by_side(translation: _Matrix) -> None:
+    """translation: of the first camera's points to the second's. Throws InvalidArgument unless the second one stands right of the first."""
     x, y, z = translation
     text = f"T = ({x:.4g}, {y:.4g}, {z:.4g}) m: "
     if not math.hypot(x, y, z) >= _LEAST_DISTANCE_M:
@@ -118,7 +119,7 @@ def _check(rig: Any) -> None:
         _check_shape(name, matrix, 3, 3 if name[0] == "R" else 4)
         if name[0] == "R":
             _check_rotation(name, matrix)
-    _check_stance(rig.T.ravel())
+    expect_side_by_side(rig.T.ravel())
     if rig.given is not None:
         apart = np.abs(rig.given[2] - rig.given[3])
         if max(apart[0, 0], apart[1, 1]) > _MOST_FOCAL_DIFFERENCE * abs(rig.given[2][0, 0]) or apart[1, 2] > _MOST_ROWS_PX:

@@ -17,6 +17,7 @@ from ..sequences import add_input, frame_times, open_input, open_without_calibra
 _MOST_GAP = 1.6  # of the usual time between two frames
 _LEAST_STEP_S, _MOST_STEP_S = 1e-4, 20.0  # between two frames
 _LEAST_LATE_PX = 0.4  # rows of another moment are farther apart
+_MOST_PAIRED_PX = 1.0  # rows of one moment are not
 _MOST_OF_BAG = 300  # frames of a bag, which is read from its start on
 _EXCHANGE = ("the calibration's right camera stands left of its left one: exchange the two cameras' rows, and where the images are swapped, too, exchange "
              "them as well; or its transformation is the inverse of the one that is meant")
@@ -130,8 +131,8 @@ def _of_times(times: Sequence[float], source: str, names: Sequence[str], numbers
         return Finding("ok", "times", text)
     first = int(gaps[0])
     if steps[first] <= 0:
-        return Finding("problem", "times", f"{text}, but after frame {names[first]} the time goes back by {-steps[first]:.4g} s",
-                       "sort the frames by time, and drop those that came twice")
+        what = f"after frame {names[first]} the time goes back by {-steps[first]:.4g} s" if steps[first] else f"frame {names[first + 1]} has the time of the one before"
+        return Finding("problem", "times", f"{text}, but {what}", "sort the frames by time, and drop those that came twice")
     return Finding("problem", "times", f"{text}, but {counted(len(gaps), 'gap')}, the first of {steps[first]:.4g} s after frame {names[first]}",
                    f"record without dropping frames, or run the parts alone: --frames :{numbers[first]} and --frames {numbers[first + 1]}:")
 
@@ -154,7 +155,7 @@ def _moments(steps: Sequence[Tuple[_Pair, _Pair]]) -> List[Finding]:
     if own > _LEAST_LATE_PX:
         late = zip(*((_spread_px(a.left, b.right), _spread_px(b.left, a.right)) for a, b in steps))
         for name, spread in zip(("right", "left"), (float(np.median(spreads)) for spreads in late)):
-            if spread < 0.5 * own:
+            if spread < min(0.5 * own, _MOST_PAIRED_PX):
                 return [Finding("problem", "moments", f"the {name} images are a frame late: so paired, rows agree within {spread:.2f} px, as they are within {own:.2f} px",
                                 "leave out the first image of that camera, and the last one of the other")]
     return []
@@ -208,7 +209,7 @@ def _examine(source: _Source, samples: int, least: int, end: int) -> List[Findin
     findings += of_pairs + moments
     is_sound = all(finding.verdict != "problem" for finding in findings)
     findings.append(source.times())
-    if is_sound and source.calibration is not None:
+    if is_sound and source.calibration is not None and not examination.is_too_small():
         findings += _motion(source.calibration, steps)
     return findings
 

@@ -9,6 +9,7 @@ from .. import _egosgm
 from ..arguments import counted
 
 _FEATURES, _FAST_THRESHOLD = 3000, 12
+_MARGIN_PX = 31  # of an image, in which no points are looked for
 _MOST_DESCRIPTOR_DISTANCE = 50  # of 256 bits
 _FEWEST_FOR_EPIPOLAR = 16  # below this a fundamental matrix says nothing
 _EPIPOLAR_PX, _RETURN_PX = 1.5, 0.3
@@ -48,7 +49,7 @@ def match_pair(left: NDArray[Any], right: NDArray[Any]) -> NDArray[np.float32]:
         raise _egosgm.InvalidArgument("the pair: give grey images of 8 or 16 bits, both of one size and depth")
     left, right = _egosgm._grey_bytes(left, right)
     none = np.empty((0, 4), np.float32)
-    detector = cv2.ORB_create(_FEATURES, 1.2, 4, 31, 0, 2, cv2.ORB_HARRIS_SCORE, 31, _FAST_THRESHOLD)
+    detector = cv2.ORB_create(_FEATURES, 1.2, 4, _MARGIN_PX, 0, 2, cv2.ORB_HARRIS_SCORE, 31, _FAST_THRESHOLD)
     (left_points, left_words), (right_points, right_words) = (detector.detectAndCompute(image, None) for image in (left, right))
     if not left_points or not right_points:
         return none
@@ -143,7 +144,7 @@ class Examination:
         """pairs: how many there are in all. REQUIRES: add() was called."""
         found = [self._images(pairs), self._of_calibration()]
         matches = np.concatenate(self._matches)
-        if not self._has_contrast() or self._levels < _FEWEST_LEVELS:  # nothing else can be told
+        if self.is_too_small() or not self._has_contrast() or self._levels < _FEWEST_LEVELS:  # nothing else can be told
             return found
         if self._equal == self._pairs:
             return [*found, Finding("problem", "matches", "the left and the right images are the same", "give the images of both cameras")]
@@ -178,6 +179,10 @@ class Examination:
         second, best = sorted(shares, key=lambda name: shares[name])[-2:]
         return best if shares[best] >= max(_SURE_OF_TURN, 2 * shares[second]) else None
 
+    def is_too_small(self) -> bool:
+        """Whether the images have no place where points are looked for. REQUIRES: add() was called."""
+        return min(self._width, self._height) <= 2 * _MARGIN_PX
+
     def _has_contrast(self) -> bool:
         return float(np.median(self._contrasts)) >= _LEAST_CONTRAST
 
@@ -193,6 +198,9 @@ class Examination:
 
     def _images(self, pairs: int) -> Finding:
         text = f"{counted(pairs, 'pair')} of {self._width}x{self._height}, {self._bits} bit"
+        if self.is_too_small():
+            return Finding("note", "images", f"{text}: they are too small to find points in, which lie {_MARGIN_PX} px from the borders or more: rows, sides, range and motion "
+                           "were not looked at", "give larger images where there are some; the poses (run --poses) where odometry finds no motion")
         if self._narrow == self._pairs:
             return Finding("problem", "images", f"{text}, but no value above 255: the upper 8 bits, which tell edges, are empty",
                            "save them with 8 bits, or multiply the values by 257")
