@@ -13,6 +13,7 @@
 #include "python/pickling.h"
 #include "vision/file_io.h"
 #include "vision/file_kinds.h"
+#include "vision/foreign_file.h"
 #include "vision/frame_panels.h"
 #include "vision/frame_source.h"
 #include "vision/image_pairs.h"
@@ -243,6 +244,7 @@ void bind_files(py::module_& module) {
       py::arg("file"));
   module.def("_expect_writable", &vision::expect_writable, py::arg("file"));
   module.def("_is_bag", &vision::is_bag, py::arg("path"));
+  module.def("_is_video", &vision::is_video, py::arg("file"));
   module.def("_is_own_calibration", &vision::is_own_calibration, py::arg("file"));
   module.def("_is_stream", &vision::is_stream, py::arg("file"));
   module.def(

@@ -18,7 +18,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kRectify = ", which `egosgm rectify` reads, with the cameras' calibration";
-constexpr const char* kVideo = "it is a video, which `egosgm run` and `rectify` read, with the cameras' calibration";
+constexpr const char* kVideo =
+    "it is a video, which `egosgm run`, `doctor` and `rectify` read, with the cameras' calibration";
 constexpr const char* kNoVideo =
     "it is named as a video, and does not begin like one: is it damaged, or another file under this name?";
 constexpr const char* kLive = "it names a live camera, which `egosgm live` reads; in Python, egosgm.live.LivePairs";

@@ -37,6 +37,18 @@ def _expect_kinds(**given: Any) -> None:
             raise _egosgm.InvalidArgument(f"{name}: is a {type(value).__name__}: {choice}")
 
 
+def _opened(path: str, frames: str, calibration: Any) -> Tuple[Any, Any]:
+    """What a path names, as for `egosgm run`: a bag, a video or a folder; and the calibration that is left to be read."""
+    if _egosgm._is_bag(path):
+        return Bag(path), calibration
+    if not _egosgm._is_video(path):
+        return _egosgm.open_folder(path, frames), calibration
+    from .videos import VideoPairs
+    is_file = isinstance(calibration, (str, os.PathLike))
+    pairs = VideoPairs(path, "", os.fsdecode(calibration) if is_file else "")
+    return pairs, pairs.source.calibration if is_file else calibration
+
+
 @dataclasses.dataclass(frozen=True, repr=False, eq=False)
 class VideoFrame:
     """A frame of a drive: images, maps and what happened."""
@@ -100,8 +112,8 @@ class StereoVideo:
                  progress: Optional[bool] = None, objects: bool = False, **options: Any) -> None:
         _expect_kinds(frames=frames, motion=motion, objects=objects, outputs=outputs, odometry=odometry)
         if isinstance(source, (str, os.PathLike)):
-            source = _egosgm.open_folder(source, frames)
-        elif frames:
+            source, calibration = _opened(os.fsdecode(source), frames, calibration)
+        if frames and not isinstance(source, _egosgm.StereoSequence):
             raise _egosgm.InvalidArgument(f"frames={frames!r}: only a folder's are chosen here")
         if not hasattr(source, "__iter__") and not isinstance(source, (_egosgm.StereoSequence, Bag)):
             raise _egosgm.InvalidArgument(f"source: is a {type(source).__name__}: give a folder, a sequence, a bag, or pairs of images")
@@ -223,7 +235,7 @@ class StereoVideo:
                                  found_objects, tracker.scene_flow() if tracker else None)
             if failure:
                 raise failure
-            told = "; ".join(filter(None, (*video.warnings(), self._source.gaps.text() if isinstance(self._source, Bag) else "")))
+            told = "; ".join(filter(None, (*video.warnings(), *_notes_of(self._source))))
             if told:
                 self._tell(f"{told}: `egosgm doctor` tells why")
         finally:
@@ -232,6 +244,11 @@ class StereoVideo:
             if pipeline:
                 pipeline.reset()
                 self._spare = [pipeline]
+
+
+def _notes_of(source: Any) -> Sequence[str]:
+    """What was unusual, of a bag or a video that was read."""
+    return [source.gaps.text()] if isinstance(source, Bag) else source.source.notes() if hasattr(source, "source") else []
 
 
 def _feed(video: Any, pairs: Iterator[Tuple[Any, ...]]) -> Optional[Exception]:
@@ -269,9 +286,10 @@ def run(source: Union[str, "os.PathLike[str]", _egosgm.StereoSequence, Bag, Iter
         for frame in egosgm.run("drive/"):
             print(frame, frame.disparity, frame.depth, frame.depth_sigma)
 
-    source: a folder as open_folder takes it, a StereoSequence, an egosgm.bag.Bag, or pairs of rectified images, grey or colour (RGB).
-    calibration: a Calibration, or a file as read_calibration takes it; without any there are disparities, but no depth and
-    no odometry.
+    source: a path as `egosgm run` takes it (a folder as open_folder does, a bag, a video of both views), a StereoSequence, an
+    egosgm.bag.Bag, or pairs of rectified images, grey or colour (RGB).
+    calibration: a Calibration, or a file as read_calibration takes it, by which a video of raw images is rectified; without any there
+    are disparities, but no depth and no odometry.
     frames: "7:10" of a folder. motion=False: no odometry, so nothing is predicted. outputs: names of maps, found in
     `frame.maps`. odometry: options of StereoOdometry. lag: 1, the device matches a frame while the next pair is asked for; 0, for a
     live camera: a frame comes before the next pair is asked for. progress: a bar by tqdm; None: where somebody looks.

@@ -45,6 +45,18 @@ def words_of_input(given: argparse.Namespace) -> List[str]:
     return words
 
 
+def videos_of_input(given: argparse.Namespace) -> Optional[Tuple[str, str]]:
+    """Two videos, or one of both views and an empty text, as `egosgm run` takes them; None where the input is another one. Throws InvalidArgument
+    where more is given."""
+    first = given.DATASET or given.dataset
+    left, right = (first, given.RIGHT) if first else (given.left, given.right)
+    if not left or not _egosgm._is_video(left):
+        return None
+    if len([word for word in words_of_input(given) if not word.startswith("--calib=")]) > 1 + bool(right):
+        raise _egosgm.InvalidArgument(f"{left}: is a video, and an input of its own: give one input, and no --frames")
+    return left, right or ""
+
+
 def open_input(given: argparse.Namespace) -> Opened:
     """What the arguments of add_input name. Throws InvalidArgument, and _NegativeBaseline where that is what is wrong with the calibration."""
     found: List[Found] = []

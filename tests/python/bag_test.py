@@ -405,6 +405,7 @@ def test_python_runs_a_bag(tmp_path, street, frames):
     found = list(egosgm.run(bag, progress=False, **OPTIONS))
     assert [frame.report.unpredicted for frame in found] == ["first frame", "", "reset", ""]
     assert [frame.motion is not None for frame in found] == [False, True, False, True]
+    assert [frame.report.unpredicted for frame in egosgm.run(bag.path, progress=False, **OPTIONS)] == ["first frame", "", "reset", ""]
     assert program("--bag", bag.path, *TOPICS, *SET, "--out", tmp_path / "out").returncode == 0
     assert [frame["unpredicted"] for frame in json.loads((tmp_path / "out/report.json").read_text())["frames"]] == ["first frame", "", "reset", ""]
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""egosgm run of videos: the maps are those of the sequence that egosgm rectify makes of them."""
+"""egosgm run of videos: the maps are those of the sequence that egosgm rectify makes of them. run() and egosgm doctor read the same."""
+import json
+import pathlib
+
 import numpy as np
 import pytest
 
@@ -67,3 +70,40 @@ def test_images_beyond_the_count_are_left_out_and_told(videos):
     source.count = FRAMES - 1
     assert [source.next().number for _ in range(FRAMES - 1)] == [0, 1]
     assert source.next() is None and "more than the 2 images that it says" in source.notes()[0]
+
+
+@pytest.mark.parametrize("is_raw", [False, True])
+def test_python_reads_a_video_as_the_program_does(is_raw, videos, calib, rig, tmp_path, told):
+    file = rig if is_raw else calib
+    told("run", videos[2], "--calib", file, "--out", tmp_path / "out", "--write", "pfm", *SET)
+    drive = egosgm.run(pathlib.Path(videos[2]), file, disparities=48, paths=4)
+    assert len(drive) == FRAMES
+    for _ in range(2):
+        found = list(drive)
+        assert len(found) == FRAMES and found[1].motion is not None
+        for frame in found:
+            assert (frame.disparity == egosgm.read_disparity(tmp_path / f"out/pfm/{frame.number:06d}.pfm")).all()
+    assert [frame.motion for frame in egosgm.run(videos[2], disparities=48, paths=4)] == [None] * FRAMES
+    with pytest.raises(egosgm.InvalidArgument, match="only a folder's"):
+        egosgm.run(videos[2], frames="1:")
+
+
+def test_doctor_looks_at_videos(videos, calib, rig, told):
+    for words, check, named in (([videos[2], "--calib", calib], "calibration", "fx "), ([*videos[:2], "--calib", calib], "rows", "points in 3 frames"),
+                                (["--left", videos[0], "--right", videos[1]], "sides", "0.0 %"), ([videos[2]], "calibration", "none was given"),
+                                ([videos[2], "--calib", rig], "images", "3 pairs of 320x96, 8 bit, rectified here by"), ([videos[2]], "times", "no time stamps")):
+        findings = {finding["check"]: finding["text"] for finding in json.loads(told("doctor", *words, "--json"))}
+        assert named in findings[check] and set(findings) >= {"images", "calibration", "rows", "sides", "range", "times"}
+
+
+def test_a_video_that_is_damaged_or_none_is_named_so(videos, tmp_path, told):
+    cut, none = tmp_path / "cut.avi", tmp_path / "none.mp4"
+    cut.write_bytes(pathlib.Path(videos[2]).read_bytes()[:300])
+    none.write_text("no video")
+    for file, named in ((cut, "is it damaged or cut"), (none, "named as a video, and does not begin like one")):
+        for command in (["run", file, "--out", tmp_path / "out"], ["doctor", file]):
+            assert named in told(*command, code=2), command
+        with pytest.raises(egosgm.InvalidArgument, match=named):
+            egosgm.run(file)
+    assert "named as a video" in told("run", none, videos[1], "--out", tmp_path / "out", code=2)
+    assert "a video, and an input of its own" in told("doctor", videos[2], "--frames", "1:", code=2)

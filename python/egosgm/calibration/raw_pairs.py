@@ -126,7 +126,8 @@ class _Video(_Source):
         has_ffmpeg = cv2.CAP_FFMPEG in cv2.videoio_registry.getStreamBackends()
         self._video = cv2.VideoCapture(file, cv2.CAP_FFMPEG if has_ffmpeg else cv2.CAP_ANY)
         if not self._video.isOpened():
-            raise _refuse(f"{file}: neither an image nor a video that OpenCV can read")
+            raise _refuse(f"{file}: " + ("begins as a video, and OpenCV cannot read it: is it damaged or cut, or is its codec unknown here?" if _egosgm._is_video(file) else
+                                         "neither an image nor a video that OpenCV can read"))
         count = int(self._video.get(cv2.CAP_PROP_FRAME_COUNT))
         self.count = count if count >= 0 else None
 

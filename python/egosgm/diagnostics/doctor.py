@@ -5,20 +5,21 @@ import itertools
 import math
 from typing import Any, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
-import cv2  # noqa: F401  who lacks it is told at once
+import cv2
 import numpy as np
 
 from .. import _egosgm
 from ..arguments import counted, json_text, Parser, tell, whole_number
 from .examination import FEWEST_MATCHES, Examination, Finding, match_pair
 from ..calibration.rectification import Rectification, StereoRig
-from ..sequences import add_input, frame_times, open_input, open_without_calibration, words_of_input
+from ..sequences import add_input, frame_times, open_input, open_without_calibration, videos_of_input, words_of_input
+from ..videos import VideoSource
 
 _MOST_GAP = 1.6  # of the usual time between two frames
 _LEAST_STEP_S, _MOST_STEP_S = 1e-4, 20.0  # between two frames
 _LEAST_LATE_PX = 0.4  # rows of another moment are farther apart
 _MOST_PAIRED_PX = 1.0  # rows of one moment are not
-_MOST_OF_BAG = 300  # frames of a bag, which is read from its start on
+_MOST_OF_STREAM = 300  # frames of a bag or a video, which is read from its start on
 _EXCHANGE = ("the calibration's right camera stands left of its left one: exchange the two cameras' rows, and where the images are swapped, too, exchange "
              "them as well; or its transformation is the inverse of the one that is meant")
 
@@ -84,18 +85,18 @@ class _OfSequence(_Source):
         return _of_times(times, file, [frame.name for frame in frames], [frame.number for frame in frames])
 
 
-class _OfBag(_Source):
-    def __init__(self, given: argparse.Namespace) -> None:
-        from ..bag import Bag
-        self._bag = Bag(given.bag, given.left_topic or "", given.right_topic or "", given.info_topics or (), max_skew_ms=given.max_skew_ms,
-                        calib=given.calib or "")
-        self._stamps: List[int] = []
-        self._frames = itertools.islice(self._bag.frames(), _MOST_OF_BAG)
-        self._next: Any = next(self._frames, None)  # then its cameras are known
-        self.calibration, self.count = self._bag.cameras.calibration, min(len(self._bag), _MOST_OF_BAG)
-        self.rectified = "its camera infos" if self._bag.is_rectified_here else ""
-        if len(self._bag) > _MOST_OF_BAG:
-            self.note = f"of {len(self._bag)} pairs the first {_MOST_OF_BAG} are looked at"
+class _OfStream(_Source):
+    """Frames that come one after the other."""
+
+    def _begin(self, frames: Iterator[Any]) -> None:
+        self._stamps: List[Any] = []
+        self._frames = itertools.islice(frames, _MOST_OF_STREAM)
+        self._next: Any = next(self._frames, None)  # then the cameras of a bag are known
+
+    def _expect(self, count: int) -> None:
+        self.count = min(count, _MOST_OF_STREAM)
+        if count > self.count:
+            self.note = f"of {count} pairs the first {self.count} are looked at"
 
     def read(self, places: Sequence[int]) -> Iterator["_Pair | Tuple[str, Exception]"]:
         wanted = set(places)
@@ -103,7 +104,35 @@ class _OfBag(_Source):
             frame, self._next = self._next, next(self._frames, None)
             self._stamps.append(frame.stamp_ns)
             if frame.number in wanted:
-                yield _Pair(frame.number, f"{frame.number:06d}", frame.left, frame.right)
+                yield _Pair(frame.number, f"{frame.number:06d}", *(image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_RGB2GRAY) for image in (frame.left, frame.right)))
+
+
+class _OfVideo(_OfStream):
+    def __init__(self, left: str, right: str, calib: Sequence[str]) -> None:
+        if len(calib) > 1:
+            raise _egosgm.InvalidArgument("--calib: give one file for a video")
+        self._video = VideoSource(left, right, *(calib or [""]))
+        self._begin(iter(self._video.next, None))
+        self._expect(self._video.count)
+        self.calibration = self._video.calibration if self._video.has_calibration else None
+        self.rectified = calib[0] if self._video.is_rectified_here else ""
+
+    def times(self) -> Finding:
+        told = self._video.notes()
+        if told:
+            return Finding("problem", "times", "; ".join(told), "record or convert it again")
+        return Finding("note", "times", "a video has no time stamps that cameras gave", "without them, gaps are not seen")
+
+
+class _OfBag(_OfStream):
+    def __init__(self, given: argparse.Namespace) -> None:
+        from ..bag import Bag
+        self._bag = Bag(given.bag, given.left_topic or "", given.right_topic or "", given.info_topics or (), max_skew_ms=given.max_skew_ms,
+                        calib=given.calib or "")
+        self._begin(self._bag.frames())
+        self._expect(len(self._bag))
+        self.calibration = self._bag.cameras.calibration
+        self.rectified = "its camera infos" if self._bag.is_rectified_here else ""
 
     def is_of_other_moments(self) -> bool:
         return self._bag.gaps.are_other_moments(self._bag.gaps.largest_skew_ms)
@@ -218,6 +247,9 @@ def _findings(given: argparse.Namespace) -> List[Finding]:
     end = given.min_disparity + given.disparities
     if given.bag:
         return _examine(_OfBag(given), given.samples, given.min_disparity, end)
+    videos = videos_of_input(given)
+    if videos:
+        return _examine(_OfVideo(*videos, given.calib or []), given.samples, given.min_disparity, end)
     try:
         sequence, calibration = open_input(given)
         source = _OfSequence(sequence, calibration, " ".join(given.calib or ()))
@@ -231,7 +263,7 @@ def _findings(given: argparse.Namespace) -> List[Finding]:
 
 
 def _parser() -> Parser:
-    parser = Parser("doctor", usage="egosgm doctor [OPTIONS] [DATASET] [RIGHT]", description="Check a sequence: rows, swapped sides, calibration, range, time stamps. Raw images are rectified, where --calib is of raw images",
+    parser = Parser("doctor", usage="egosgm doctor [OPTIONS] [DATASET] [RIGHT]", description="Check a sequence or a video: rows, swapped sides, calibration, range, time stamps. Raw images are rectified, where --calib is of raw images",
                     epilog="Points are matched in the whole image, without regard to rows, sides or range. Exit code 2 where a problem was\n"
                     "found; below each stands its remedy.")
     add_input(parser)
