@@ -47,51 +47,6 @@ TEST(Pipeline, SaysWhyNothingWasPredictedAndWhatWasSearched) {
   EXPECT_EQ(unpredicted(1, true), Unpredicted::kNotTemporal);
 }
 
-// The belief of the frame without a motion is what the next one predicts from.
-TEST(Pipeline, PredictsAgainAfterAFrameWithoutMotion) {
-  const Setting setting = standard();
-  const Video video(setting, 3);
-  Pipeline broken = make_pipeline(setting), fresh = make_pipeline(setting);
-  process(broken, setting, video, 0);
-  const Result gap = process(broken, setting, video, 1, std::nullopt);
-  EXPECT_EQ(gap.report.predicted_fraction, 0);
-  EXPECT_EQ(valid_part(gap.outputs.predicted.values()), 0);
-  EXPECT_TRUE(same_bits(gap.outputs.disparity.values(), gap.outputs.measured.values(), setting.size));
-  const Result after = process(broken, setting, video, 2);
-  EXPECT_EQ(after.report.unpredicted, std::nullopt);
-  EXPECT_GT(after.report.predicted_fraction, 0.5);
-  EXPECT_LT(after.report.search_fraction, 0.6);
-}
-
-TEST(Pipeline, WithoutTimeEveryFrameIsAlone) {
-  Setting setting = standard();
-  setting.options.temporal = false;
-  ASSERT_TRUE(setting.options.vertical_alignment.enabled);
-  const Video video(setting, 3);
-  Pipeline pipeline = make_pipeline(setting), other = make_pipeline(setting);
-  process(pipeline, setting, video, 0);
-  process(pipeline, setting, video, 1);
-  const Result result = process(pipeline, setting, video, 2);
-  const Result alone = process(other, setting, video, 2, std::nullopt);
-  EXPECT_TRUE(same_outputs(result.outputs, alone.outputs, setting.size));
-  EXPECT_TRUE(same_bits(result.outputs.disparity.values(), result.outputs.measured.values(), setting.size));
-  EXPECT_EQ(result.report.predicted_fraction, 0);
-}
-
-// With search=full the prediction is fused, but narrows nothing.
-TEST(Pipeline, FullSearchStillFusesThePrediction) {
-  Setting setting = standard();
-  setting.options.search = SearchMode::kFull;
-  const Video video(setting, 2);
-  Pipeline pipeline = make_pipeline(setting);
-  process(pipeline, setting, video, 0);
-  const Result result = process(pipeline, setting, video, 1);
-  EXPECT_NE(result.outputs.variance.values(), result.outputs.measured_variance.values());
-  EXPECT_DOUBLE_EQ(result.report.search_fraction, 1);
-  EXPECT_NEAR(result.report.predicted_fraction, valid_part(result.outputs.predicted.values()), 1e-12);
-  EXPECT_GT(result.report.predicted_fraction, 0.5);
-}
-
 TEST(Pipeline, ReportsWhatItDid) {
   const Setting setting = standard();
   const Video video(setting, 4);

@@ -8,8 +8,8 @@ import unittest
 
 import numpy
 
-from input_case import InputTest, read_grey, write_grey
-from program_case import FRAMES, HAS_PACKAGE, HEIGHT, WIDTH, egosgm, png
+from input_case import InputTest, read_grey, write_grey, write_grey16
+from program_case import FRAMES, HAS_PACKAGE, HEIGHT, WIDTH, egosgm
 
 
 class Brought(InputTest):
@@ -175,11 +175,11 @@ class Doubts(Brought):
 
     def test_a_pedestal_and_a_hot_pixel_of_16_bits(self):
         """Motions are found as in 8 bits, and doctor finds points."""
-        street = self.broken_street()
-        for file in (*(street / "image_0").iterdir(), *(street / "image_1").iterdir()):
-            rows = (7000 + 3 * read_grey(file).astype(numpy.uint16)).astype(">u2")
-            rows[HEIGHT // 2, WIDTH // 3] = 65535
-            file.write_bytes(png(WIDTH, HEIGHT, 16, (row.tobytes() for row in rows)))
+        def brighter(image):
+            image = 7000 + 3 * image.astype(numpy.uint16)
+            image[HEIGHT // 2, WIDTH // 3] = 65535
+            return image
+        street = self.changed_street(brighter, write=write_grey16)
         self.assertNotIn("no motion", self.assert_works("run", street, "--out", self.new_folder() / "out"))
         self.assertEqual(self.examine(street)["rows"]["verdict"], "ok")
 
@@ -248,6 +248,12 @@ class KnownFormats(Brought):
         self.assertEqual(self.report(folder / "other")["calibration"], self.report(folder / "own")["calibration"])
         for name in ("{}/disparity/000001.png", "{}/poses.txt", "{}.txt"):
             self.assertEqual((folder / name.format("other")).read_bytes(), (folder / name.format("own")).read_bytes())
+        file.write_text(f"{f} 0 {cx} 0 {f} {cy} 0 0 1\n3\n")
+        said = self.assert_works("run", *self.with_calibration(file), "--frames", 0, "--out", folder / "doubtful")
+        self.assertIn(f"--calib {file} --frames 0` tells why", said)
+        k = [[f, 0, cx], [0, f, cy], [0, 0, 1]]
+        (folder / "raw.json").write_text(json.dumps({"K1": k, "K2": k, "D1": [0.1, 0, 0, 0], "D2": [0] * 4, "R": numpy.eye(3).tolist(), "T": [-baseline, 0, 0]}))
+        self.assert_refused(["run", *self.with_calibration(folder / "raw.json"), "--out", folder / "never"], "is of raw images")
         own.write_text(own.read_text().replace("baseline_m", "baseline_m = 1\nbase"))  # of a format that is known: the program itself says it
         self.assert_refused(["run", *self.with_calibration(own), "--out", folder / "never"], own, "unknown key 'base'")
 
@@ -288,7 +294,7 @@ class Maps(Brought):
         file.write_bytes(f"Pf\n{values.shape[1]} {values.shape[0]}\n-1\n".encode() + values[::-1].astype("<f4").tobytes())
 
     def png16(self, file, values):
-        file.write_bytes(png(values.shape[1], values.shape[0], 16, (row.astype(">u2").tobytes() for row in values.astype(numpy.int64) % 65536)))
+        write_grey16(file, values.astype(numpy.int64) % 65536)
 
     def setUp(self):
         self.maps = self.new_folder()

@@ -20,6 +20,10 @@ def write_grey(file, image):
     PIL.Image.fromarray(numpy.ascontiguousarray(image, numpy.uint8)).save(file)
 
 
+def write_grey16(file, image):
+    PIL.Image.fromarray(numpy.ascontiguousarray(image, numpy.uint16)).save(file)
+
+
 def sampled(image, x, y):
     """Bilinear, the border repeated."""
     return cv2.remap(image, x.astype(numpy.float32), y.astype(numpy.float32), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
@@ -34,6 +38,14 @@ class InputTest(ProgramTest):
         rows = dict(line.split(":") for line in (self.street / "calib.txt").read_text().splitlines())
         left, right = ([float(number) for number in rows[name].split()] for name in ("P0", "P1"))
         return left[0], left[2], left[6], (left[3] - right[3]) / left[0]  # f, cx, cy, baseline
+
+    def changed_street(self, change, sides=("image_0", "image_1"), write=write_grey):
+        """One whose images are `change` of what they were."""
+        street = self.broken_street()
+        for side in sides:
+            for file in (street / side).iterdir():
+                write(file, change(read_grey(file)))
+        return street
 
     def examine(self, *arguments, code=0):
         """Verdicts by check."""

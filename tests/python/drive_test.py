@@ -18,7 +18,6 @@ import pytest
 
 import egosgm
 from egosgm import cpu_driver, viewer
-from egosgm.bag import program as bag_program
 from egosgm.bag import ros_images
 from egosgm.diagnostics import examination
 from egosgm.geometry import points
@@ -442,25 +441,10 @@ def test_a_doubtful_drive_is_told(street, frames):
     swapped = [(frame.right, frame.left) for frame in frames]
     with pytest.warns(UserWarning, match="density|no motion"):
         list(egosgm.run(swapped, street.calibration, **OPTIONS))
-    far = egosgm.Calibration(street.calibration.fx, street.calibration.fy, 5, street.calibration.cy, 54)
-    with pytest.warns(UserWarning, match="a baseline of 54 m"):
-        list(egosgm.run([(frames[0].left, frames[0].right)], far, **OPTIONS))
-    wide = egosgm.Calibration(street.calibration.fx, street.calibration.fy, street.calibration.cx, street.calibration.cy, 3)
-    with pytest.warns(UserWarning, match="few rigs .* decimetres .0.3 m."):
-        list(egosgm.run([(frames[0].left, frames[0].right)], wide, motion=False, **OPTIONS))
-
-
-def test_the_program_takes_calibrations_that_the_package_reads(street, street_folder, tmp_path, capfd):
-    c, file = street.calibration, tmp_path / "rig.json"
-    given = ["--left", str(street_folder / "image_0/*.png"), "--right", str(street_folder / "image_1/*.png"), "--calib", str(file), "--frames", "0"]
-    k = [[c.fx, 0, c.cx], [0, c.fy, c.cy], [0, 0, 1]]
-    file.write_text(json.dumps(dict(fx=c.fx, fy=c.fy, cx=c.cx, cy=c.cy, baseline=3)))
-    assert bag_program.main([*given, "--out", str(tmp_path / "run")]) == 0
-    assert f"--calib {file} --frames 0` tells why" in capfd.readouterr().out
-    assert json.loads((tmp_path / "run/report.json").read_text())["calibration"]["baseline_m"] == 3
-    file.write_text(json.dumps(dict(K1=k, K2=k, D1=[0.1, 0, 0, 0], D2=[0, 0, 0, 0], R=np.eye(3).tolist(), T=[-c.baseline_m, 0, 0])))
-    assert bag_program.main([*given, "--out", str(tmp_path / "raw")]) == 2
-    assert "is of raw images" in capfd.readouterr().err and not (tmp_path / "raw").exists()
+    for baseline_m, told in ((54, "a baseline of 54 m"), (3, "few rigs .* decimetres .0.3 m.")):
+        far = egosgm.Calibration(**{**dataclasses.asdict(street.calibration), "baseline_m": baseline_m})
+        with pytest.warns(UserWarning, match=told):
+            list(egosgm.run([(frames[0].left, frames[0].right)], far, motion=False, **OPTIONS))
 
 
 def test_rows_that_no_alignment_mends_are_told(street, frames):
