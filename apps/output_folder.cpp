@@ -161,10 +161,12 @@ OutputFolder::OutputFolder(const std::string& folder, bool resume, const std::ve
 void OutputFolder::look() {
   if (is_new_or_empty("--out", shown_, path_)) return;
   if (!resume_) {
-    throw InvalidArgument(fmt::format(
-        "--out {}: is not empty: give a new folder, or --resume to go on with a run that lies there; a run that is not "
-        "wanted any more can be removed by hand",
-        shown_));
+    const bool is_of_a_run = is_there(path_ / "report.json");
+    throw InvalidArgument(
+        fmt::format("--out {}: is not empty: give a new folder{}", shown_,
+                    is_of_a_run ? ", or --resume to go on with the run that lies there; a run that is not wanted any "
+                                  "more can be removed by hand"
+                                : ""));
   }
   const fs::path file = path_ / "report.json";
   if (!is_regular(file)) {

@@ -5,6 +5,7 @@
 
 #include <cstdlib>
 #include <nlohmann/json.hpp>
+#include <system_error>
 
 #include "egosgm/error.h"
 #include "host/json_text.h"
@@ -62,7 +63,8 @@ std::optional<Tuning> kept_tuning(const std::filesystem::path& file, const Devic
 Device tuned_by_argument(const Device& device, const std::string& argument) {
   if (argument == "none") return device;
   const std::filesystem::path file = argument.empty() ? user_tuning_file() : std::filesystem::path(argument);
-  if (argument.empty() && !std::filesystem::exists(file)) return device;
+  std::error_code none;  // the home folder may be one that this user cannot read
+  if (argument.empty() && !std::filesystem::exists(file, none)) return device;
   const std::optional<Tuning> sizes = kept_tuning(file, device.info());
   return sizes ? device.with_tuning(*sizes) : device;
 }

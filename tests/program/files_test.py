@@ -10,7 +10,7 @@ import subprocess
 import threading
 import unittest
 
-from program_case import PROGRAM, ProgramTest, grey_png
+from program_case import PROGRAM, ProgramTest, egosgm, grey_png
 
 METHOD = ("--disparities", 16, "--quiet")
 CALIBRATION = "fx = 100\nfy = 100\ncx = 32\ncy = 15\nbaseline_m = 0.5\n"
@@ -65,6 +65,16 @@ class InputFiles(FilesTest):
                 self.assert_refused_and_untouched(user, ["run", *self.pair(user), "--out", out, *how], named)
             self.assert_refused_and_untouched(user, ["run", "--left", "left/%06d.png", "--right", "right/%06d.png", "--calib", "calib.toml",
                                                      "--out", ".", *how], named, cwd=user)
+
+    def test_only_a_run_is_one_to_go_on_with_or_to_remove(self):
+        self.assertTrue(egosgm("run", self.street, "--out", self.street).stderr.endswith("is not empty: give a new folder\n"))
+
+    def test_a_home_folder_that_cannot_be_looked_into(self):
+        env = {name: value for name, value in os.environ.items() if not name.startswith("XDG_")}
+        kept = os.path.join(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "pocl/kcache")  # PoCL's own place
+        env.update(HOME="/" + 300 * "x", POCL_CACHE_DIR=os.environ.get("POCL_CACHE_DIR", kept))
+        done = egosgm("run", self.street, "--out", self.new_folder() / "out", *METHOD, env=env)
+        self.assertEqual(done.returncode, 0, done.stderr)
 
     def test_a_sequence_keeps_its_truth_and_may_hold_results(self):
         street = self.broken_street()
