@@ -122,6 +122,11 @@ void SequenceArguments::expect_one_input(bool needs_calibration) const {
         "FILE, or a data set's folder");
   }
   if (sources.size() > 1) {
+    if (left.empty() && right.empty() && !calib.empty()) {
+      throw InvalidArgument(
+          "--calib " + calib + ": " + sources[0] +
+          " is read with the calibration in it: put this one there, or give --left and --right with it");
+    }
     const std::string hint = patterns && is_image(folder) ? "; did the shell expand a pattern? quote it: '*.png'" : "";
     throw InvalidArgument("more than one input: " + sources[0] + " and " + sources[1] + ": give one of them" + hint);
   }

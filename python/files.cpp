@@ -13,6 +13,7 @@
 #include "python/pickling.h"
 #include "vision/file_io.h"
 #include "vision/file_kinds.h"
+#include "vision/folder_contents.h"
 #include "vision/foreign_file.h"
 #include "vision/frame_panels.h"
 #include "vision/frame_source.h"
@@ -245,6 +246,14 @@ void bind_files(py::module_& module) {
   module.def("_expect_writable", &vision::expect_writable, py::arg("file"));
   module.def("_is_bag", &vision::is_bag, py::arg("path"));
   module.def("_is_video", &vision::is_video, py::arg("file"));
+  module.def(
+      "_find_two_cameras",
+      [](const path& folder) -> std::optional<std::pair<std::string, std::string>> {
+        const auto cameras = vision::find_two_cameras(folder);
+        if (!cameras || !cameras->calibration.empty()) return std::nullopt;
+        return std::pair(cameras->left, cameras->right);
+      },
+      py::arg("folder"), "Patterns of the left and the right images of a folder without a calibration of its own.");
   module.def("_is_own_calibration", &vision::is_own_calibration, py::arg("file"));
   module.def("_is_stream", &vision::is_stream, py::arg("file"));
   module.def(

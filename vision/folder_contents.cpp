@@ -311,7 +311,15 @@ fs::path foreign_calibration(const fs::path& folder, const TwoCameras& cameras) 
       files.push_back(folder / name);
     }
   }
-  return cameras.calibration.empty() && files.size() == 1 ? files.front() : fs::path();
+  // Of a file for each camera the left one will do: its reader finds the other one.
+  const bool is_pair =
+      files.size() == 2 && std::any_of(std::begin(kSides), std::end(kSides), [&](const auto& side) {
+        const std::string name = files[0].filename().string();
+        const std::size_t at = name.find(side.first);
+        return at != std::string::npos &&
+               std::string(name).replace(at, std::strlen(side.first), side.second) == files[1].filename();
+      });
+  return cameras.calibration.empty() && (files.size() == 1 || is_pair) ? files.front() : fs::path();
 }
 
 std::set<std::string> list_scenes(const fs::path& images) {

@@ -29,7 +29,7 @@ struct TwoCameras {
 EGOSGM_EXPORT std::optional<TwoCameras> find_two_cameras(const std::filesystem::path& folder);
 
 /// The only file beside the images that may be their calibration, of another name or format than calib.txt; empty where
-/// there is none, or more than one.
+/// there is none, or more than one; of one for each camera the left one.
 std::filesystem::path foreign_calibration(const std::filesystem::path& folder, const TwoCameras& cameras);
 
 /// Scenes of a multi-view folder of images: NNNNNN of NNNNNN_FF.png. Throws InvalidArgument where it cannot be listed.

@@ -37,16 +37,20 @@ def _expect_kinds(**given: Any) -> None:
             raise _egosgm.InvalidArgument(f"{name}: is a {type(value).__name__}: {choice}")
 
 
-def _opened(path: str, frames: str, calibration: Any) -> Tuple[Any, Any]:
-    """What a path names, as for `egosgm run`: a bag, a video or a folder; and the calibration that is left to be read."""
-    if _egosgm._is_bag(path):
+def _opened(paths: Sequence[str], frames: str, calibration: Any) -> Tuple[Any, Any]:
+    """What one path or two name, as for `egosgm run`: a bag, videos, pictures or a folder; and the calibration that is left to be read."""
+    path, right = (*paths, "")[:2]
+    if not path:
+        raise _egosgm.InvalidArgument('source: is "": give the path of a folder, a bag or a video')
+    if not right and _egosgm._is_bag(path):
         return Bag(path), calibration
-    if not _egosgm._is_video(path):
-        return _egosgm.open_folder(path, frames), calibration
-    from .videos import VideoPairs
-    is_file = isinstance(calibration, (str, os.PathLike))
-    pairs = VideoPairs(path, "", os.fsdecode(calibration) if is_file else "")
-    return pairs, pairs.source.calibration if is_file else calibration
+    if _egosgm._is_video(path):
+        from .videos import VideoPairs
+        is_file = isinstance(calibration, (str, os.PathLike))
+        pairs = VideoPairs(path, right, os.fsdecode(calibration) if is_file else "")
+        return pairs, pairs.source.calibration if is_file else calibration
+    patterns = (path, right) if right else _egosgm._find_two_cameras(path) if calibration is not None else None
+    return _egosgm.open_patterns(*patterns, "", frames) if patterns else _egosgm.open_folder(path, frames), calibration
 
 
 @dataclasses.dataclass(frozen=True, repr=False, eq=False)
@@ -106,17 +110,18 @@ class VideoFrame:
 class StereoVideo:
     """What run() gives: iterate over it, as often as you like."""
 
-    def __init__(self, source: Union[str, "os.PathLike[str]", _egosgm.StereoSequence, Bag, Iterable[Tuple[NDArray[Any], NDArray[Any]]]],
+    def __init__(self, source: Union[str, "os.PathLike[str]", Sequence[Union[str, "os.PathLike[str]"]], _egosgm.StereoSequence, Bag, Iterable[Tuple[NDArray[Any], NDArray[Any]]]],
                  calibration: "_egosgm.Calibration | str | os.PathLike[str] | None" = None, *, frames: str = "", motion: bool = True,
                  outputs: Union[str, Sequence[str]] = ("disparity", "variance"), odometry: Optional[Dict[str, Any]] = None, lag: int = 1,
                  progress: Optional[bool] = None, objects: bool = False, **options: Any) -> None:
         _expect_kinds(frames=frames, motion=motion, objects=objects, outputs=outputs, odometry=odometry)
-        if isinstance(source, (str, os.PathLike)):
-            source, calibration = _opened(os.fsdecode(source), frames, calibration)
+        paths = [source] if isinstance(source, (str, os.PathLike)) else source if isinstance(source, (tuple, list)) and len(source) == 2 else []
+        if paths and all(isinstance(path, (str, os.PathLike)) for path in paths):
+            source, calibration = _opened([os.fsdecode(path) for path in paths], frames, calibration)
         if frames and not isinstance(source, _egosgm.StereoSequence):
             raise _egosgm.InvalidArgument(f"frames={frames!r}: only a folder's are chosen here")
         if not hasattr(source, "__iter__") and not isinstance(source, (_egosgm.StereoSequence, Bag)):
-            raise _egosgm.InvalidArgument(f"source: is a {type(source).__name__}: give a folder, a sequence, a bag, or pairs of images")
+            raise _egosgm.InvalidArgument(f"source: is a {type(source).__name__}: give a path, a sequence, a bag, or pairs of images, as egosgm.live.LivePairs takes from cameras")
         self.sequence = source if isinstance(source, _egosgm.StereoSequence) else None
         self._calibration_file: "str | os.PathLike[str]" = ""
         self.calibration = self._calibration_from(source, calibration)
@@ -187,7 +192,7 @@ class StereoVideo:
         for number, pair in enumerate(self._source):  # type: ignore[arg-type]
             if not isinstance(pair, (tuple, list)) or len(pair) != 2:
                 of = f" of {len(pair)}" if isinstance(pair, (tuple, list)) else ""
-                raise _egosgm.InvalidArgument(f"pair {number}: is a {type(pair).__name__}{of}: give (left, right), each an image")
+                raise _egosgm.InvalidArgument(f"pair {number}: is a {type(pair).__name__}{of}: give pairs (left, right), each an image; one alone is [(left, right)]")
             if any(image is None for image in pair):
                 raise _egosgm.InvalidArgument(f"pair {number}: holds None in place of an image, as a camera or cv2.imread gives where it has none: leave it out")
             left, right = (np.array(image) for image in pair)  # copies: a camera may use its buffers again before the frame is handed out
@@ -277,7 +282,7 @@ def _bar(progress: Optional[bool]):
     return lambda frames, count: tqdm(frames, total=count, unit=" frames", disable=False if progress else None)
 
 
-def run(source: Union[str, "os.PathLike[str]", _egosgm.StereoSequence, Bag, Iterable[Tuple[NDArray[Any], NDArray[Any]]]],
+def run(source: Union[str, "os.PathLike[str]", Sequence[Union[str, "os.PathLike[str]"]], _egosgm.StereoSequence, Bag, Iterable[Tuple[NDArray[Any], NDArray[Any]]]],
         calibration: "_egosgm.Calibration | str | os.PathLike[str] | None" = None, *, frames: str = "", motion: bool = True,
         outputs: Union[str, Sequence[str]] = ("disparity", "variance"), odometry: Optional[Dict[str, Any]] = None, lag: int = 1,
         progress: Optional[bool] = None, objects: bool = False, **options: Any) -> StereoVideo:
@@ -286,8 +291,8 @@ def run(source: Union[str, "os.PathLike[str]", _egosgm.StereoSequence, Bag, Iter
         for frame in egosgm.run("drive/"):
             print(frame, frame.disparity, frame.depth, frame.depth_sigma)
 
-    source: a path as `egosgm run` takes it (a folder as open_folder does, a bag, a video of both views), a StereoSequence, an
-    egosgm.bag.Bag, or pairs of rectified images, grey or colour (RGB).
+    source: a path as `egosgm run` takes it (a folder as open_folder does, a bag, a video of both views), or two, (left, right), of
+    videos, pictures or patterns; a StereoSequence, an egosgm.bag.Bag, or pairs of rectified images, grey or colour (RGB).
     calibration: a Calibration, or a file as read_calibration takes it, by which a video of raw images is rectified; without any there
     are disparities, but no depth and no odometry.
     frames: "7:10" of a folder. motion=False: no odometry, so nothing is predicted. outputs: names of maps, found in

@@ -130,7 +130,7 @@ class Doubts(Brought):
         self.assertNotIn("no depth", self.assert_works("run", folder, "--calib", self.street / "calib.txt", "--out", out))
         self.assertTrue((out / "poses.txt").exists())
         shutil.copy(self.street / "calib.txt", folder)
-        self.assert_refused(["run", folder, "--calib", self.street / "calib.txt", "--out", folder / "never"], "more than one input")
+        self.assert_refused(["run", folder, "--calib", self.street / "calib.txt", "--out", folder / "never"], "is read with the calibration in it")
 
     def test_a_missing_baseline_is_no_reason_to_exchange_cameras(self):
         f, cx, cy, baseline = self.calibration()

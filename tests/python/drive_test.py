@@ -9,6 +9,7 @@ import os
 import pathlib
 import pickle
 import re
+import shutil
 import sys
 import types
 import unittest.mock
@@ -89,6 +90,22 @@ def test_a_calibration_of_images_of_another_size_is_refused(street_folder, tmp_p
 
 def maps_of(frames):
     return [frame.disparity for frame in frames]
+
+
+def test_what_a_path_names_is_what_the_program_makes_of_it(street_folder, calib, tmp_path):
+    """Pictures, and a folder whose calibration is another file's."""
+    expected = next(iter(egosgm.run(street_folder, **OPTIONS))).disparity
+    pictures = [street_folder / f"image_{side}/000000.png" for side in (0, 1)]
+    for names in ("left", "image_0"), ("right", "image_1"):
+        shutil.copytree(street_folder / names[1], tmp_path / "rig" / names[0])
+    (tmp_path / "rig/rig.json").write_text("{}")
+    for source, calibration in ((pictures, None), (tuple(map(str, pictures)), calib), (tmp_path / "rig", calib), (tmp_path / "rig", egosgm.read_calibration(calib))):
+        first = next(iter(egosgm.run(source, calibration, **OPTIONS)))
+        assert (first.disparity == expected).all() and (first.calibration is None) == (calibration is None)
+    with pytest.raises(egosgm.InvalidArgument, match="rig.json"):
+        egosgm.run(tmp_path / "rig")
+    with pytest.raises(egosgm.InvalidArgument, match="give the path of a folder"):
+        egosgm.run("")
 
 
 def test_an_iteration_may_end_where_it_likes_and_two_may_run_at_once(street_folder):

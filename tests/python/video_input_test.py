@@ -84,6 +84,8 @@ def test_python_reads_a_video_as_the_program_does(is_raw, videos, calib, rig, tm
         for frame in found:
             assert (frame.disparity == egosgm.read_disparity(tmp_path / f"out/pfm/{frame.number:06d}.pfm")).all()
     assert [frame.motion for frame in egosgm.run(videos[2], disparities=48, paths=4)] == [None] * FRAMES
+    first = next(iter(egosgm.run((pathlib.Path(videos[0]), videos[1]), file, disparities=48, paths=4)))
+    assert (first.disparity == egosgm.read_disparity(tmp_path / "out/pfm/000000.pfm")).all()
     with pytest.raises(egosgm.InvalidArgument, match="only a folder's"):
         egosgm.run(videos[2], frames="1:")
 

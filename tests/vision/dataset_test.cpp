@@ -395,6 +395,9 @@ TEST_F(DatasetTest, TwoFoldersOfImagesAndTheirCalibrationAreASequence) {
   add_text("e/rig.json", "{}");
   expect_refused([&] { open_folder(root_ / "e"); },
                  {"no calib.txt: put their calibration there", "/e --calib '" + path("e/rig.json") + "'"});
+  std::filesystem::remove(root_ / "e/rig.json");
+  add_text("e/left.yaml", "a: 1"), add_text("e/right.yaml", "a: 1");
+  expect_refused([&] { open_folder(root_ / "e"); }, {"/e --calib '" + path("e/left.yaml") + "'"});
   add_text("e/others.json", "{}");
   EXPECT_FALSE(open_folder(root_ / "e").has_calibration);
   add_images({"g/cam_Left/1", "g/cam_Right/1", "h/L/1", "h/R/1"});

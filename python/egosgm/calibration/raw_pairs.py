@@ -214,7 +214,7 @@ class _TwoSources(RawPairs):
         self._sources = _open(left), _open(right)
         counts = [source.count for source in self._sources]
         if None not in counts and counts[0] != counts[1]:
-            raise _refuse(f"--left {left} has {counts[0]} images, --right {right} has {counts[1]}: give as many of both")
+            raise _refuse(f"--left {left} has {counts[0]} images, --right {right} has {counts[1]}: give as many of both, cut where they show other moments; `ffmpeg -i VIDEO -frames:v N -c:v ffv1 VIDEO.mkv` keeps the first N")
         self.count = counts[0]
 
     def __iter__(self) -> Iterator[RawPair]:
