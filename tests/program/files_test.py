@@ -10,21 +10,11 @@ import subprocess
 import threading
 import unittest
 
-from program_case import PROGRAM, ProgramTest, egosgm, grey_png
+from program_case import PROGRAM, ProgramTest, egosgm, grey_png, state
 
 METHOD = ("--disparities", 16, "--quiet")
+TUNE = ("--width", 64, "--height", 24, "--disparities", 16, "--rounds", 2, "--stage")
 CALIBRATION = "fx = 100\nfy = 100\ncx = 32\ncy = 15\nbaseline_m = 0.5\n"
-
-
-def state(folder):
-    """Every file and link below `folder`, with its bytes and mode."""
-    found = {}
-    for path in sorted(folder.rglob("*")):
-        if path.is_symlink():
-            found[path] = os.readlink(path)
-        elif path.is_file():
-            found[path] = (path.read_bytes(), stat.S_IMODE(path.stat().st_mode))
-    return found
 
 
 class FilesTest(ProgramTest):
@@ -43,11 +33,6 @@ class FilesTest(ProgramTest):
     @staticmethod
     def pair(folder):
         return ["--left", folder / "left/%06d.png", "--right", folder / "right/%06d.png", "--calib", folder / "calib.toml", *METHOD]
-
-    def assert_refused_and_untouched(self, folder, arguments, *named, code=2, **options):
-        before = state(folder)
-        self.assert_refused(arguments, *named, code=code, **options)
-        self.assertEqual(state(folder), before, arguments)
 
     def run_into(self, out, *arguments):
         self.assert_works("run", "--odometry", self.street, "--out", out, "--frames", "0:1", *METHOD, *arguments)
@@ -297,13 +282,13 @@ class Streams(FilesTest):
 class TuneFiles(FilesTest):
     def test_an_interrupt_keeps_the_earlier_tuning(self):
         file = self.new_folder() / "tuning.json"
-        self.assert_works("tune", "--file", file, "--width", 64, "--height", 24, "--disparities", 16, "--rounds", 2, "--stage", "ForwardWarp")
+        self.assert_works("tune", "--file", file, *TUNE, "ForwardWarp")
         kept = json.loads(file.read_text())
         next(iter(kept.values())).update(tile_width=96, tile_height=8)
         file.write_text(json.dumps(kept))
         before = file.read_bytes()
         for lines in (1, 4):  # then the last one of six waits to be read
-            process = self.started("tune", "--file", file, "--width", 64, "--height", 24, "--disparities", 16, "--rounds", 2, "--stage", "ForwardWarp", lines=lines)
+            process = self.started("tune", "--file", file, *TUNE, "ForwardWarp", lines=lines)
             process.send_signal(signal.SIGINT)
             _, errors = process.communicate(timeout=900)
             # PoCL's compiler says the first line where the interrupt meets it; nothing else may come.
@@ -313,7 +298,7 @@ class TuneFiles(FilesTest):
 
     def test_one_stage_leaves_the_sizes_of_the_others(self):
         file = self.new_folder() / "tuning.json"
-        tune = ["tune", "--file", file, "--width", 64, "--height", 24, "--disparities", 16, "--rounds", 2, "--stage"]
+        tune = ["tune", "--file", file, *TUNE]
         self.assert_works(*tune, "ForwardWarp")
         kept = json.loads(file.read_text())
         sizes = next(iter(kept.values()))
@@ -342,7 +327,7 @@ class TuneFiles(FilesTest):
 
     def test_a_file_that_is_no_tuning_file_stays(self):
         folder = self.new_folder()
-        tune = ["tune", "--width", 64, "--height", 24, "--disparities", 16, "--rounds", 2, "--stage", "ForwardWarp", "--file"]
+        tune = ["tune", *TUNE, "ForwardWarp", "--file"]
         (folder / "tuning.json").write_text('{"another, driver 1": {"tile_width": 96, "tile_height": 8}}')
         self.assert_works(*tune, folder / "tuning.json")
         self.assert_works(*tune, folder / "tuning.json")

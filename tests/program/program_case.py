@@ -12,6 +12,7 @@ import os
 import pathlib
 import re
 import shutil
+import stat
 import struct
 import subprocess
 import sys
@@ -122,6 +123,17 @@ def grey_png(width, height, depth=8, frame=0):
     return png(width, height, depth, (bytes((x * 7 + y * 13 + x * y + frame) % 256 for x in range(width * depth // 8)) for y in range(height)))
 
 
+def state(folder):
+    """Every file and link below `folder`, with its bytes and mode."""
+    found = {}
+    for path in sorted(folder.rglob("*")):
+        if path.is_symlink():
+            found[path] = os.readlink(path)
+        elif path.is_file():
+            found[path] = (path.read_bytes(), stat.S_IMODE(path.stat().st_mode))
+    return found
+
+
 class ProgramTest(unittest.TestCase):
     """A folder with a small synthetic sequence for each class, and a copy of it for each test that breaks it."""
 
@@ -180,6 +192,11 @@ class ProgramTest(unittest.TestCase):
         self.assertTrue(lines[0].startswith("egosgm: error: "), lines[0])
         for text in named:
             self.assertIn(str(text), lines[0])
+
+    def assert_refused_and_untouched(self, folder, arguments, *named, code=2, **options):
+        before = state(folder)
+        self.assert_refused(arguments, *named, code=code, **options)
+        self.assertEqual(state(folder), before, arguments)
 
     def report(self, out):
         return json.loads((out / "report.json").read_text())

@@ -220,10 +220,8 @@ class Killed(LongRuns):
         process.kill()
         process.communicate()
         (out / "notes.txt").write_text("mine")
-        before = {file: file.read_bytes() for file in out.rglob("*") if file.is_file()}
         run = ["run", "--odometry", street, "--out", out, "--write", "variance"]
-        self.assert_refused(run, out, "is not empty", "--resume", "removed by hand")
-        self.assertEqual({file: file.read_bytes() for file in out.rglob("*") if file.is_file()}, before)
+        self.assert_refused_and_untouched(out, run, out, "is not empty", "--resume", "removed by hand")
         self.assert_works(*run, "--resume")
         self.assertTrue(self.report(out)["finished"])
         self.assertEqual(self.assert_whole(out), self.LONG)
@@ -321,9 +319,7 @@ class Resume(LongRuns):
             self.assert_works(*run, out)
             (out / f"disparity/{FRAMES - 1:06d}.png").unlink()
             what()
-            before = {file: file.read_bytes() for file in out.rglob("0*.*")}
-            self.assert_refused([*run, out], "--resume", "disparity/000001.png", "another --out")
-            self.assertEqual({file: file.read_bytes() for file in out.rglob("0*.*")}, before)
+            self.assert_refused_and_untouched(out / "disparity", [*run, out], "--resume", "disparity/000001.png", "another --out")
 
         broken(lambda: poses.write_text("\n".join([rows[0], rows[2], rows[1], rows[3]]) + "\n"))
         broken(lambda: shutil.copy(street / "image_0/000002.png", street / "image_0/000001.png"))
@@ -332,9 +328,7 @@ class Resume(LongRuns):
         out = self.new_folder()
         run = ["run", *run, "--disparities", 16, "--out", out, "--quiet"]
         self.assert_works(*run)
-        before = {file: file.read_bytes() for file in out.rglob("*") if file.is_file()}
-        self.assert_refused([*run, "--frames", "0:1", "--resume"], "--resume", f"disparity/{first_map}", "give the frames", "another --out")
-        self.assertEqual({file: file.read_bytes() for file in out.rglob("*") if file.is_file()}, before)
+        self.assert_refused_and_untouched(out, [*run, "--frames", "0:1", "--resume"], "--resume", f"disparity/{first_map}", "give the frames", "another --out")
 
     def test_fewer_frames_leave_the_run_as_it_is(self):
         self.assert_fewer_frames_change_nothing("--odometry", self.street, first_map="000002.png")
@@ -353,11 +347,9 @@ class Resume(LongRuns):
             street, out = self.broken_street(), self.new_folder() / "out"
             run = ["run", "--odometry", street, "--out", out, "--quiet"]
             self.assert_works(*run)
-            before = {file: file.read_bytes() for file in out.rglob("*") if file.is_file()}
             image = street / f"image_1/{broken:06d}.png"
             os.truncate(image, 1000)
-            self.assert_refused([*run, "--resume"], "--resume", f"disparity/{broken:06d}.png", image, "another --out")
-            self.assertEqual({file: file.read_bytes() for file in out.rglob("*") if file.is_file()}, before)
+            self.assert_refused_and_untouched(out, [*run, "--resume"], "--resume", f"disparity/{broken:06d}.png", image, "another --out")
 
     def test_a_finished_run_that_left_a_pair_out_stays_too(self):
         street, out = self.broken_street(), self.new_folder() / "out"
@@ -366,13 +358,11 @@ class Resume(LongRuns):
         os.truncate(image, 1000)
         run = ["run", "--odometry", street, "--out", out, "--quiet"]
         self.assertEqual(egosgm(*run).returncode, 0)
-        before = {file: file.read_bytes() for file in out.rglob("*") if file.is_file()}
         image.write_bytes(whole)
-        self.assert_refused([*run, "--resume"], f"disparity/{FRAMES - 1:06d}.png", "left out", "another --out")
+        self.assert_refused_and_untouched(out, [*run, "--resume"], f"disparity/{FRAMES - 1:06d}.png", "left out", "another --out")
         os.truncate(image, 1000)
         os.truncate(street / "image_0/000000.png", 1000)
-        self.assert_refused([*run, "--resume"], "disparity/000000.png", "another --out")
-        self.assertEqual({file: file.read_bytes() for file in out.rglob("*") if file.is_file()}, before)
+        self.assert_refused_and_untouched(out, [*run, "--resume"], "disparity/000000.png", "another --out")
 
     def test_a_run_that_lost_its_device_goes_on_there(self):
         """By a report that says so: another device than the one that is here cannot be had."""
