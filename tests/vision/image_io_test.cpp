@@ -13,6 +13,7 @@
 #include <random>
 
 #include "egosgm/vision/opencv.h"
+#include "tests/fuzz/png_seed.h"
 #include "tests/support/expect_refused.h"
 #include "tests/vision/temporary_folder.h"
 #include "vision/file_io.h"
@@ -46,30 +47,39 @@ struct PngForm {
   std::size_t chunk_bytes = 8192;
 };
 
-/// OpenCV writes neither palettes nor interlaced files, and chooses the filters itself.
-void write_with_libpng(const std::filesystem::path& file, const cv::Mat& image, const PngForm& form) {
+/// OpenCV writes neither palettes nor interlaced files, and chooses the filters itself. `write_rows`: by libpng.
+template <typename WriteRows>
+void write_with_libpng(const std::filesystem::path& file, Size size, int bits, const PngForm& form,
+                       WriteRows&& write_rows) {
   std::FILE* stream = std::fopen(file.c_str(), "wb");
   ASSERT_NE(stream, nullptr);
   png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
   png_infop info = png_create_info_struct(png);
   png_init_io(png, stream);
   png_set_filter(png, 0, form.filters);
+  png_set_compression_level(png, 9);
   png_set_compression_buffer_size(png, form.chunk_bytes);
-  png_set_IHDR(png, info, static_cast<png_uint_32>(image.cols), static_cast<png_uint_32>(image.rows),
-               static_cast<int>(8 * image.elemSize1()), form.color_type, form.interlace, PNG_COMPRESSION_TYPE_DEFAULT,
-               PNG_FILTER_TYPE_DEFAULT);
+  png_set_IHDR(png, info, static_cast<png_uint_32>(size.width), static_cast<png_uint_32>(size.height), bits,
+               form.color_type, form.interlace, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
   png_color palette[256];
   for (int i = 0; i < 256; ++i) palette[i] = {static_cast<png_byte>(i), static_cast<png_byte>(255 - i), 7};
-  if (form.color_type == PNG_COLOR_TYPE_PALETTE) png_set_PLTE(png, info, palette, 256);
+  if (form.color_type == PNG_COLOR_TYPE_PALETTE) png_set_PLTE(png, info, palette, 1 << bits);
   png_write_info(png, info);
-  if (image.depth() == CV_16U) png_set_swap(png);
-  if (image.channels() == 3) png_set_bgr(png);
-  std::vector<png_bytep> rows;
-  for (int y = 0; y < image.rows; ++y) rows.push_back(const_cast<png_bytep>(image.ptr(y)));
-  png_write_image(png, rows.data());
+  write_rows(png, info);
   png_write_end(png, nullptr);
   png_destroy_write_struct(&png, &info);
   std::fclose(stream);
+}
+
+void write_with_libpng(const std::filesystem::path& file, const cv::Mat& image, const PngForm& form) {
+  const int bits = static_cast<int>(8 * image.elemSize1());
+  write_with_libpng(file, {image.cols, image.rows}, bits, form, [&](png_structp png, png_infop) {
+    if (image.depth() == CV_16U) png_set_swap(png);
+    if (image.channels() == 3) png_set_bgr(png);
+    std::vector<png_bytep> rows;
+    for (int y = 0; y < image.rows; ++y) rows.push_back(const_cast<png_bytep>(image.ptr(y)));
+    png_write_image(png, rows.data());
+  });
 }
 
 class ImageIo : public ::testing::Test {
@@ -185,15 +195,7 @@ std::string with_header_size(std::string png, std::uint32_t width, std::uint32_t
     png[16 + i] = static_cast<char>(width >> (24 - 8 * i));
     png[20 + i] = static_cast<char>(height >> (24 - 8 * i));
   }
-  const auto table = [](std::uint32_t c) {
-    for (int k = 0; k < 8; ++k) c = c & 1 ? 0xedb88320u ^ (c >> 1) : c >> 1;
-    return c;
-  };
-  std::uint32_t crc = 0xffffffffu;
-  for (std::size_t i = 12; i < 29; ++i) crc = table((crc ^ static_cast<std::uint8_t>(png[i])) & 0xff) ^ (crc >> 8);
-  crc ^= 0xffffffffu;
-  for (std::size_t i = 0; i < 4; ++i) png[29 + i] = static_cast<char>(crc >> (24 - 8 * i));
-  return png;
+  return fuzz::with_checksums(png);
 }
 
 TEST_F(ImageIo, HugeSizesAreRefusedFromTheHeader) {
@@ -239,7 +241,7 @@ TEST_F(ImageIo, NonImagesAreRefused) {
 TEST_F(ImageIo, WhatIsGivenInPlaceOfAnImageIsNamed) {
   const std::pair<std::string, std::string> kinds[] = {
       {"version https://git-lfs.github.com/spec/v1\noid sha256:0\n", "git lfs pull"},
-      {std::string("\0\0\0\x18", 4) + "ftypmp42", "is a video, which `egosgm run` and `rectify` read"},
+      {std::string("\0\0\0\x18", 4) + "ftypmp42", "is a video, which `egosgm run`, `doctor` and `rectify` read"},
       {"RIFF0000AVI LIST", "is a video"},
       {std::string("II*\0", 4) + "12345678", "is a TIFF"},
       {"P5\n2 2\n255\n1234", "is a PGM"},
@@ -387,23 +389,11 @@ TEST_F(ImageIo, AJpegOfManyScansIsRefused) {
 
 /// A file of few bytes and many pixels: one colour, of `bits` bits.
 void write_bomb(const std::filesystem::path& file, int side, int color_type, int bits) {
-  std::FILE* stream = std::fopen(file.c_str(), "wb");
-  ASSERT_NE(stream, nullptr);
-  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
-  png_infop info = png_create_info_struct(png);
-  png_init_io(png, stream);
-  png_set_compression_level(png, 9);
-  const auto pixels = static_cast<png_uint_32>(side);
-  png_set_IHDR(png, info, pixels, pixels, bits, color_type, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
-               PNG_FILTER_TYPE_DEFAULT);
-  const png_color palette[2] = {{0, 0, 0}, {255, 255, 255}};
-  if (color_type == PNG_COLOR_TYPE_PALETTE) png_set_PLTE(png, info, palette, 2);
-  png_write_info(png, info);
-  const std::vector<png_byte> row(png_get_rowbytes(png, info));
-  for (int y = 0; y < side; ++y) png_write_row(png, row.data());
-  png_write_end(png, nullptr);
-  png_destroy_write_struct(&png, &info);
-  std::fclose(stream);
+  const PngForm form{.color_type = color_type, .filters = PNG_FILTER_NONE};
+  write_with_libpng(file, {side, side}, bits, form, [&](png_structp png, png_infop info) {
+    const std::vector<png_byte> row(png_get_rowbytes(png, info));
+    for (int y = 0; y < side; ++y) png_write_row(png, row.data());
+  });
 }
 
 TEST_F(ImageIo, TheBoundHoldsForPixelsAsTheyAreWidened) {
