@@ -29,7 +29,8 @@ constexpr double kMinFlow_px = 1;                        // that its motion make
 constexpr double kMinContradiction = 14;                 // of the camera's motion: squared, in standard deviations
 constexpr double kMinShare = 0.4;                        // of its points that agree with its motion
 constexpr double kMinKnownGain = 0.67, kMinNewGain = 1;  // in the mean of its label
-constexpr double kMaxNewCost = 2.2;                      // of its own motion, in that mean
+constexpr double kMaxNewCost = 2.1;                      // of its own motion, in that mean
+constexpr double kMaxCostOfGain = 0.8;                   // if it costs more: what comes from behind something does
 constexpr double kMaxVelocity_m = 3.5;
 constexpr double kSteadyShare = 0.5, kSteady_m = 0.02;  // by which its velocity may differ from that before
 constexpr double kSameFlow_px = 1.5;                    // two that differ by less are one object
@@ -377,10 +378,10 @@ double ObjectTracker::State::contradiction(const Group& group, const Eigen::Isom
 /// Whether a candidate's motion is more than noise, by the images and by geometry.
 bool ObjectTracker::State::moves(const Candidate& candidate) const {
   double gain = 0;
-  for (const float each : candidate.gains) gain += each;
-  return gain >= (candidate.is_new() ? kMinNewGain : kMinKnownGain) * candidate.label.size() &&
-         !(candidate.is_new() && candidate.cost > kMaxNewCost) && candidate.fit.share >= kMinShare &&
-         flow_apart(candidate.label, candidate.back, camera_back) >= kMinFlow_px &&
+  for (const float each : candidate.gains) gain += each / static_cast<float>(candidate.label.size());
+  return gain >= (candidate.is_new() ? kMinNewGain : kMinKnownGain) &&
+         !(candidate.is_new() && candidate.cost > std::max(kMaxNewCost, kMaxCostOfGain * gain)) &&
+         candidate.fit.share >= kMinShare && flow_apart(candidate.label, candidate.back, camera_back) >= kMinFlow_px &&
          contradiction(candidate.label, candidate.back) >= kMinContradiction;
 }
 
