@@ -209,7 +209,7 @@ def test_the_calibration_is_read_as_rectify_reads_it(cameras, tmp_path, monkeypa
 
 
 def test_an_interrupt_ends_it_and_what_was_recorded_is_whole(cameras, calib, tmp_path, monkeypatch):
-    before = signal.getsignal(signal.SIGINT)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background ignores it
     shows, shown, late = live.Page.show, threading.Event(), []
 
     def show(*arguments):
