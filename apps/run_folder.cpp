@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
+#include "egosgm/error.h"
 #include "host/json_text.h"
 #include "vision/file_io.h"
 
@@ -58,6 +59,7 @@ std::optional<vision::StereoSequence> frames_of_run(const fs::path& path) {
   const fs::path file = report_of(path);
   if (file.empty()) return std::nullopt;
   const Json run = parse_json(vision::read_file(file, kMaxReportBytes), file);
+  if (run.is_discarded()) throw InvalidArgument(file.string() + ": is no JSON: it was cut or edited; run it again");
   if (!run.is_object() || !run.contains("frames")) return std::nullopt;
   vision::StereoSequence sequence;
   for (const Json& entry : run["frames"]) {

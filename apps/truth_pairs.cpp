@@ -3,7 +3,6 @@
 
 #include <fmt/core.h>
 
-#include "apps/counted.h"
 #include "apps/option_group.h"
 #include "apps/run_folder.h"
 #include "egosgm/error.h"
@@ -33,22 +32,6 @@ vision::EvaluationPairs find_truth_pairs(const fs::path& estimate, const fs::pat
   return vision::pair_with_truth(estimate, truth, options);
 }
 
-std::string text_of(const vision::EvaluationPairs& pairs) {
-  const vision::EvaluationPair& first = pairs.pairs.front();
-  const fs::path named = pairs.pairs.size() == 1 ? first.truth : first.truth.parent_path();
-  std::string text = fmt::format("Compared with {}.", named.filename().string());
-  for (const vision::EvaluationPair& pair : pairs.pairs) {
-    if (pair.same_name) continue;
-    text += fmt::format(" {} and {} belong together by their number only.", pair.estimate.filename().string(),
-                        pair.truth.filename().string());
-    break;
-  }
-  if (!pairs.without_truth.empty()) {
-    text += fmt::format(" {} without truth.", counted(pairs.without_truth.size(), "frame"));
-  }
-  return text;
-}
-
 void ComparisonArguments::add_to(CLI::App& command, const std::string& estimate_help, const std::string& truth_help) {
   OptionGroup options(command);
   options.add("ESTIMATE", positional_[0], "", "what --estimate takes");
@@ -58,7 +41,7 @@ void ComparisonArguments::add_to(CLI::App& command, const std::string& estimate_
   options.add("--frames", frames, "FIRST:LAST", "only these frame numbers, both ends included: 7:10, 7:, :10 or 7");
 }
 
-void ComparisonArguments::resolve(bool truth_is_needed) {
+void ComparisonArguments::resolve() {
   for (const std::string& argument : positional_) {
     if (argument.empty()) continue;
     std::string& free = estimate.empty() ? estimate : truth;
@@ -69,8 +52,7 @@ void ComparisonArguments::resolve(bool truth_is_needed) {
     free = argument;
   }
   if (estimate.empty()) throw InvalidArgument("no estimate: give ESTIMATE TRUTH, or --estimate and --truth");
-  if (truth.empty() && truth_is_needed)
-    throw InvalidArgument("no truth: give ESTIMATE TRUTH, or --estimate and --truth");
+  if (truth.empty()) throw InvalidArgument("no truth: give ESTIMATE TRUTH, or --estimate and --truth");
 }
 
 }  // namespace egosgm::app

@@ -15,18 +15,14 @@ namespace egosgm::app {
 vision::EvaluationPairs find_truth_pairs(const std::filesystem::path& estimate, const std::filesystem::path& truth,
                                          const std::string& frames = {});
 
-/// One sentence: with which files or folder the estimates were compared, and what belongs together by number only.
-std::string text_of(const vision::EvaluationPairs& pairs);
-
 /// The files to compare: `COMMAND ESTIMATE TRUTH`, or --estimate and --truth, or one of each kind; and --frames.
 struct ComparisonArguments {
   std::string estimate, truth, frames;
 
   /// `estimate_help` and `truth_help` say what --estimate and --truth take.
   void add_to(CLI::App& command, const std::string& estimate_help, const std::string& truth_help);
-  /// Fills `estimate` and `truth` from the positional arguments. Throws InvalidArgument unless both are given once;
-  /// without `truth_is_needed` the truth may be missing.
-  void resolve(bool truth_is_needed = true);
+  /// Fills `estimate` and `truth` from the positional arguments. Throws InvalidArgument unless both are given once.
+  void resolve();
 
  private:
   std::string positional_[2];

@@ -7,6 +7,8 @@
 
 #include <limits>
 
+#include "apps/run_folder.h"
+#include "apps/truth_pairs.h"
 #include "egosgm/vision/disparity_io.h"
 #include "egosgm/vision/render.h"
 #include "python/arrays.h"
@@ -95,12 +97,12 @@ void bind_estimates(py::module_& module) {
       .def_readonly("same_name", &vision::EvaluationPair::same_name);
   module.def(
       "_pair_with_truth",
-      [](const path& estimate, const path& truth, const std::string& frames,
-         const std::map<std::string, std::string>& image_names) {
-        const auto found = vision::pair_with_truth(estimate, truth, {range_of(frames), image_names});
+      [](const path& estimate, const path& truth, const std::string& frames) {
+        const auto found = app::find_truth_pairs(estimate, truth, frames);
         return py::make_tuple(found.pairs, found.without_estimate, found.without_truth);
       },
-      py::arg("estimate"), py::arg("truth"), py::arg("frames"), py::arg("image_names"));
+      py::arg("estimate"), py::arg("truth"), py::arg("frames"));
+  module.def("_frames_of_run", &app::frames_of_run, py::arg("path"));
   module.def(
       "_list_maps",
       [](const path& estimate, const std::string& frames) { return vision::list_maps(estimate, range_of(frames)); },

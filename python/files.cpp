@@ -2,12 +2,14 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
+#include "apps/output_folder.h"
 #include "egosgm/vision/calibration_io.h"
 #include "egosgm/vision/dataset.h"
 #include "egosgm/vision/disparity_io.h"
 #include "egosgm/vision/image_io.h"
 #include "egosgm/vision/point_cloud.h"
 #include "egosgm/vision/poses_io.h"
+#include "host/json_text.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
 #include "python/pickling.h"
@@ -143,6 +145,15 @@ py::bytes read_file(const path& file, std::size_t max_bytes) {
   return py::bytes(bytes);
 }
 
+/// A file's JSON as bytes, once it is found to be JSON, and bounded.
+py::bytes read_json(const path& file) {
+  const std::string bytes = vision::read_file(file, kMaxJsonBytes);
+  if (parse_json(bytes, file).is_discarded()) {
+    throw InvalidArgument(file.string() + ": is no JSON: it was cut or edited; run it again");
+  }
+  return py::bytes(bytes);
+}
+
 /// Throws IoError where a file has come there meanwhile.
 void write_new_file(const path& file, const py::bytes& bytes) {
   const vision::KeepFiles others;
@@ -235,6 +246,7 @@ void bind_files(py::module_& module) {
       .def(py::init<int>(), py::arg("disparities"))
       .def("layers", &layers_of_run, py::arg("folder"), py::arg("name"), py::arg("left"), py::arg("truth"));
   module.def("_read_file", &read_file, py::arg("file"), py::arg("max_bytes"));
+  module.def("_read_json", &read_json, py::arg("file"));
   module.def("_write_new_file", &write_new_file, py::arg("file"), py::arg("bytes"));
   module.def("_write_new_calibration", &write_new_calibration, py::arg("file"), py::arg("calibration"));
   module.def("_find_pairs", &find_pairs, py::arg("left"), py::arg("right"), py::arg("by_order"));
@@ -243,7 +255,14 @@ void bind_files(py::module_& module) {
   module.def(
       "_read_stored_image", [](const path& file) { return array_of(vision::read_stored_image(file)); },
       py::arg("file"));
-  module.def("_expect_writable", &vision::expect_writable, py::arg("file"));
+  module.def(
+      "_expect_new_file",
+      [](const std::string& option, const path& file) { app::expect_new_file(option, file.string()); },
+      py::arg("option"), py::arg("file"));
+  module.def(
+      "_expect_new_folder",
+      [](const std::string& option, const path& folder) { app::new_folder(option, folder.string()); },
+      py::arg("option"), py::arg("folder"));
   module.def("_is_bag", &vision::is_bag, py::arg("path"));
   module.def("_is_video", &vision::is_video, py::arg("file"));
   module.def(
@@ -255,7 +274,6 @@ void bind_files(py::module_& module) {
       },
       py::arg("folder"), "Patterns of the left and the right images of a folder without a calibration of its own.");
   module.def("_is_own_calibration", &vision::is_own_calibration, py::arg("file"));
-  module.def("_is_stream", &vision::is_stream, py::arg("file"));
   module.def(
       "_read_calibration",
       [](const path& file) {

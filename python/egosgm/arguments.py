@@ -12,8 +12,6 @@ from typing import Any, NoReturn
 
 from . import _egosgm
 
-_MOST_BYTES, _MOST_LEVELS, _MOST_KEYS = 256 << 20, 64, 2000
-
 
 class Parser(argparse.ArgumentParser):
     def __init__(self, command: str, **options: Any) -> None:
@@ -71,58 +69,7 @@ def whole_number(text: str) -> int:
 
 
 def read_json(file: pathlib.Path) -> Any:
-    """The file's JSON, which is bounded as in C++ (host/json_text.h)."""
-    def finite(text: str) -> float:
-        value = float(text)
-        if not math.isfinite(value):
-            raise ValueError
-        return value
-
-    def refuse(why: str) -> NoReturn:
-        raise _egosgm.InvalidArgument(f"{file}: {why}: is it the right file?")
-
-    def few_keys(pairs: Any) -> Any:
-        if len(pairs) > _MOST_KEYS:
-            refuse(f"has an object of more than {_MOST_KEYS} keys")
-        return dict(pairs)
-
-    def check_levels(part: Any, levels: int) -> None:
-        if isinstance(part, (dict, list)):
-            if levels >= _MOST_LEVELS:
-                raise RecursionError
-            for inner in part.values() if isinstance(part, dict) else part:
-                check_levels(inner, levels + 1)
-
-    content = _egosgm._read_file(file, _MOST_BYTES)
-    try:
-        found = json.loads(content, object_pairs_hook=few_keys, parse_float=finite, parse_constant=finite)
-        check_levels(found, 0)
-        return found
-    except RecursionError:
-        refuse(f"is nested deeper than {_MOST_LEVELS} levels")
-    except _egosgm.InvalidArgument:
-        raise
-    except ValueError:  # JSONDecodeError, or no UTF-8
-        raise _egosgm.InvalidArgument(f"{file}: is no JSON: it was cut or edited; run it again") from None
-
-
-def expect_new_file(option: str, file: pathlib.Path) -> None:
-    """Refuses a file that is there, a folder, and what cannot be written. Pipes and devices are written through."""
-    if file.is_dir():
-        raise _egosgm.InvalidArgument(f"{option} {file}: is a folder: give the name of a file")
-    if file.is_file() and not _egosgm._is_stream(os.fspath(file)):
-        raise _egosgm.InvalidArgument(f"{option} {file}: is there already: give another name, or remove it first")
-    _egosgm._expect_writable(os.fspath(file))
-
-
-def expect_new_folder(option: str, folder: pathlib.Path) -> None:
-    """Refuses what is neither new nor an empty folder."""
-    if not folder.is_symlink() and not folder.exists():
-        return
-    if not folder.is_dir():
-        raise _egosgm.InvalidArgument(f"{option} {folder}: is no folder: give a new folder")
-    if any(folder.iterdir()):
-        raise _egosgm.InvalidArgument(f"{option} {folder}: is not empty: give a new folder")
+    return json.loads(_egosgm._read_json(file))
 
 
 def comparison_parser(command: str, description: str, estimate_help: str, truth_help: str) -> Parser:

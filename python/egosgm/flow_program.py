@@ -11,7 +11,6 @@ import numpy as np
 
 from . import _egosgm
 from .arguments import comparison_parser, counted, json_text, resolve_comparison, tell, text_argument
-from .run_folder import frames_of_run
 from .evaluation.flow_evaluation import MEASURES, SceneFlowFigures, count_outliers, evaluation_of, match_objects
 from .video_program import read_flow
 
@@ -118,8 +117,7 @@ def _pairs_of(estimate: _Path, truth: _Path, frames: Any) -> Tuple[List[Dict[str
     pairs = []
     for names in _FOLDERS:
         place = _place(estimate, names)
-        run = frames_of_run(place)
-        found, missing, _ = _egosgm._pair_with_truth(place, _place(truth, names), text_argument(frames), run.images if run else {})
+        found, missing, _ = _egosgm._pair_with_truth(place, _place(truth, names), text_argument(frames))
         pairs.append({pair.name: pair for pair in found})
     return pairs, missing
 

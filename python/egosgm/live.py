@@ -13,7 +13,7 @@ import urllib.parse
 from typing import Any, Deque, Dict, Iterator, Optional, Sequence, Tuple, Union
 
 from . import _egosgm
-from .arguments import Parser, counted, expect_new_folder, say, tell
+from .arguments import Parser, counted, say, tell
 from .calibration.raw_pairs import RawPair, is_camera, open_pairs
 from .calibration.rectify import Rectifier, SequenceFolder, add_calibration, unit_m
 from .drive import run
@@ -243,7 +243,7 @@ def main(arguments: Sequence[str]) -> int:
         raise _egosgm.InvalidArgument(f"--port {given.port}: choose from 0 to 65535")
     options = _options(given.set)
     if given.record:
-        expect_new_folder("--record", pathlib.Path(given.record))
+        _egosgm._expect_new_folder("--record", pathlib.Path(given.record))
     pairs = LivePairs(given.left, given.right, side_by_side=given.side_by_side, top_bottom=given.top_bottom, calib=given.calib, unit_m=unit_m(given.unit),
                       fisheye=given.fisheye)
     video = run(pairs, pairs.calibration, lag=0, progress=False, device=given.device, **options)

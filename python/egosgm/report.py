@@ -14,11 +14,10 @@ import numpy
 import PIL.Image
 
 from . import _egosgm
-from .arguments import counted, expect_new_file, Parser, read_json, tell, text_argument, whole_number
+from .arguments import counted, Parser, read_json, tell, text_argument, whole_number
 from .moving_objects import ObjectPictures
 
 _PICTURES = 6
-_MOST_FRAMES = 2_000_000  # as many rows as a text of poses may have
 _LARGEST = 2**31 - 1
 _MOST_SIDE = 16384
 _FIGURES = ("bad_or_missing", "bad_1px", "bad_of_valid", "density", "interpolated", "d1", "d1_interpolated", "mae_px", "mean_error_px", "filled",
@@ -188,8 +187,7 @@ class _Page:
         if not self._given.truth:
             self._notes.append("Without truth there are no errors: egosgm report OUT TRUTH compares.")
             return {"metrics": {}}
-        images = {frame.name: frame.image for frame in self._of_run if frame.image}
-        pairs, _, alone = _egosgm._pair_with_truth(self._given.run, self._given.truth, text_argument(self._given.frames or ""), images)
+        pairs, _, alone = _egosgm._pair_with_truth(self._given.run, self._given.truth, text_argument(self._given.frames or ""))
         truths = [pair.truth for pair in pairs]
         note = f"Compared with {(truths[0] if len(truths) == 1 else truths[0].parent).name}."
         for pair in pairs:
@@ -256,14 +254,9 @@ class _Page:
             estimated = [poses[frame.place] for frame in self._frames if frame.place < len(poses)]
         if self._given.poses:
             poses, numbers = _egosgm.read_poses(self._given.poses), [frame.number for frame in self._frames]
-            true = poses[_egosgm._rows_of_frames(numbers, self._numbers(), len(poses), self._given.poses, "poses")]
+            whole = _egosgm._frames_of_run(self._folder).numbers
+            true = poses[_egosgm._rows_of_frames(numbers, whole, len(poses), self._given.poses, "poses")]
         return {"path": from_above(estimated), "true_path": from_above(true)}
-
-    def _numbers(self) -> Sequence[int]:
-        """All numbers of the sequence that the run's were chosen from, where they have no gaps."""
-        sequence = self._run.get("sequence")
-        first, last, count = (_number(sequence, key) for key in ("first_frame", "last_frame", "frames"))
-        return range(first, last + 1) if first >= 0 and 1 <= count <= _MOST_FRAMES and last - first == count - 1 else []
 
     def _changed_options(self) -> List[str]:
         used = self._run["options"]
@@ -281,7 +274,7 @@ def main(arguments: Sequence[str]) -> int:
     file = pathlib.Path(given.out) if given.out else pathlib.Path(given.run) / "report.html"
     try:
         page = _Page(given)
-        expect_new_file("--out", file)
+        _egosgm._expect_new_file("--out", file)
         text = page.html().encode(errors="replace")
     except (AttributeError, KeyError, TypeError) as error:
         raise _egosgm.InvalidArgument(f"{given.run}/report.json: not the report of a run: {re.sub(r'_egosgm[.]', '', str(error))}") from error

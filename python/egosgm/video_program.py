@@ -14,7 +14,6 @@ from . import _egosgm
 from .evaluation import plots
 from .arguments import comparison_parser, counted, decimal, json_text, Parser, resolve_comparison, tell, text_argument
 from .evaluation.pose_evaluation import inverse
-from .run_folder import frames_of_run
 from .evaluation.video_evaluation import Frame, VideoCounts, VideoFigures, count_frames, density_of, figures_of, regions_of
 
 _Path = pathlib.Path
@@ -131,8 +130,7 @@ class VideoInput:
                 _egosgm._expect_scaled("--truth-scale", given.truth_scale, frame.truth)
 
     def _pairs_with(self, estimate: _Path, truth: _Path) -> Tuple[List[Any], List[_Path], List[_Path]]:
-        run = frames_of_run(estimate)
-        return _egosgm._pair_with_truth(estimate, truth, text_argument(self.given.frames), run.images if run else {})
+        return _egosgm._pair_with_truth(estimate, truth, text_argument(self.given.frames))
 
     def _list_frames(self) -> None:
         """Every estimate, with its truth where it has one."""

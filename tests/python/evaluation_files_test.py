@@ -8,7 +8,7 @@ import egosgm
 import numpy as np
 import pytest
 
-from egosgm import run_folder, video_program
+from egosgm import video_program
 from egosgm.evaluation import plots
 
 
@@ -54,17 +54,17 @@ def test_what_is_no_flow_is_refused(tmp_path, content, named):
 def test_a_report_that_is_no_json_is_refused(tmp_path, report):
     (tmp_path / "report.json").write_text(report)
     with pytest.raises(egosgm.InvalidArgument, match="report.json"):
-        run_folder.frames_of_run(tmp_path)
+        egosgm._egosgm._frames_of_run(tmp_path)
 
 
 def test_the_frames_of_a_run(tmp_path):
     (tmp_path / "report.json").write_text('{"frames": [{"frame": 7, "left": "l/a_7.png"}, {"frame": 8, "name": "x"}], '
                                           '"sequence": {"first_frame": 5, "last_frame": 8, "frames": 4}}')
     (tmp_path / "disparity").mkdir()
-    run = run_folder.frames_of_run(tmp_path / "disparity/000007.png")
-    assert (run.numbers, run.images, run.sequence) == ([7, 8], {"000007": "a_7"}, [5, 6, 7, 8])
+    run = egosgm._egosgm._frames_of_run(tmp_path / "disparity/000007.png")
+    assert ([frame.number for frame in run.frames], run.frames[0].left.stem, run.frames[1].name, run.numbers) == ([7, 8], "a_7", "x", [5, 6, 7, 8])
     (tmp_path / "report.json").write_text('{"frames": [{"frame": true}]}')
-    assert run_folder.frames_of_run(tmp_path) is None
+    assert egosgm._egosgm._frames_of_run(tmp_path) is None
 
 
 def corner(ahead_m, right_m, scale=1.0):

@@ -14,7 +14,7 @@ RUNNING = pathlib.Path(egosgm.__file__).parents[1]
 KNOWN = re.compile(r"is inconsistent, metaclass differs$|\.__init__ is inconsistent, stub does not have \*args parameter \"args\"$"
                    r"|\.(__match_args__|__signature__|__all__) is not present in stub$|^egosgm\._options failed to import\.")
 CONFIGURATION = """[mypy]
-[mypy-egosgm.__main__,egosgm.arguments,egosgm.bag.*,egosgm.calibration.*,egosgm.cpu_driver,egosgm.diagnostics.*,egosgm.drive,egosgm.evaluation.*,egosgm.flow_program,egosgm.geometry.*,egosgm.live,egosgm.matcher,egosgm.moving_objects,egosgm.program,egosgm.report,egosgm.run_folder,egosgm.sequences,egosgm.values,egosgm.video_program,egosgm.videos,egosgm.viewer]
+[mypy-egosgm.__main__,egosgm.arguments,egosgm.bag.*,egosgm.calibration.*,egosgm.cpu_driver,egosgm.diagnostics.*,egosgm.drive,egosgm.evaluation.*,egosgm.flow_program,egosgm.geometry.*,egosgm.live,egosgm.matcher,egosgm.moving_objects,egosgm.program,egosgm.report,egosgm.sequences,egosgm.values,egosgm.video_program,egosgm.videos,egosgm.viewer]
 ignore_errors = True
 [mypy-cv2.*,PIL.*,matplotlib.*,tqdm.*,rerun.*,yaml.*]
 ignore_missing_imports = True

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _egosgm
-from ..arguments import counted, decimal, expect_new_file, expect_new_folder, Parser, tell
+from ..arguments import counted, decimal, Parser, tell
 from .boards import Board, Corners, charuco, chessboard, drawn, other_size
 from .raw_pairs import RawPair, open_pairs
 from .rectification import StereoRig, projections
@@ -281,9 +281,9 @@ def main(arguments: Sequence[str]) -> int:
         raise _egosgm.InvalidArgument(f"--pair-by {given.pair_by}: choose name or order")
     board, columns, rows = _board_of(given)
     out = pathlib.Path(given.out)
-    expect_new_file("--out", out)
+    _egosgm._expect_new_file("--out", out)
     if given.pictures:
-        expect_new_folder("--pictures", pathlib.Path(given.pictures))
+        _egosgm._expect_new_folder("--pictures", pathlib.Path(given.pictures))
         pathlib.Path(given.pictures).mkdir(parents=True, exist_ok=True)
     found = _Views(given, board, columns, rows)
     assert found.size is not None

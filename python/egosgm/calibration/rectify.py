@@ -10,7 +10,7 @@ import threading
 from typing import Any, List, Optional, Sequence, Tuple
 
 from .. import _egosgm
-from ..arguments import Parser, counted, decimal, expect_new_folder, say
+from ..arguments import Parser, counted, decimal, say
 from .reader import find, read_euroc_rig
 from .raw_pairs import RawPair, open_pairs
 from .rectification import Rectification, StereoRig
@@ -167,7 +167,7 @@ def main(arguments: Sequence[str]) -> int:
     stream = iter(pairs)
     first = next(stream, None)
     rectifier = Rectifier(given.calib, first.left.shape[1::-1] if first else None, given.unit, given.fisheye, given.alpha, given.euroc)
-    expect_new_folder("--out", pathlib.Path(given.out))
+    _egosgm._expect_new_folder("--out", pathlib.Path(given.out))
     folder = SequenceFolder(pathlib.Path(given.out))
     stops: List[int] = []
     if threading.current_thread() is threading.main_thread():

@@ -8,7 +8,6 @@ from typing import Any, List, Sequence, Tuple
 import numpy as np
 
 from .. import _egosgm
-from ..arguments import expect_new_file
 from .pose_evaluation import evaluate_poses, inverse
 from .video_evaluation import DensityFigures
 
@@ -20,7 +19,7 @@ def expect_plot(option: str, name: str) -> None:
     file = pathlib.Path(name)
     if file.suffix not in (".png", ".svg"):
         raise _egosgm.InvalidArgument(f"{option} {name}: the name must end in .png or .svg")
-    expect_new_file(option, file)
+    _egosgm._expect_new_file(option, file)
     try:
         import matplotlib.figure  # noqa: F401
     except ImportError:

@@ -10,7 +10,6 @@ from .. import _egosgm
 from . import plots
 from ..arguments import comparison_parser, counted, json_text, resolve_comparison, tell, text_argument
 from .pose_evaluation import PoseEvaluation, evaluate_poses
-from ..run_folder import frames_of_run
 
 
 def _poses_file_of(name: str) -> Tuple[pathlib.Path, List[int]]:
@@ -34,13 +33,13 @@ def read_pairs(estimate_name: str, truth_name: str, frames: str) -> Tuple[np.nda
     first, last = _egosgm._parse_frame_range(text_argument(frames)) if frames else (None, None)
     is_chosen = lambda number: (first is None or number >= first) and (last is None or number <= last)
     # Which frames the estimate's rows are of: the run tells, or --frames where they are as many, or they are all.
-    run = frames_of_run(estimate_file)
+    run = _egosgm._frames_of_run(estimate_file)
     is_of_run = estimate_file.name == "poses.txt" and estimate_file.with_name("report.json").is_file()
-    if run and is_of_run and len(run.numbers) != len(estimate):
-        raise _egosgm.InvalidArgument(f"{estimate_file} holds {counted(len(estimate), 'pose')}, and the report beside it lists {counted(len(run.numbers), 'frame')}: let "
+    if run and is_of_run and len(run) != len(estimate):
+        raise _egosgm.InvalidArgument(f"{estimate_file} holds {counted(len(estimate), 'pose')}, and the report beside it lists {counted(len(run), 'frame')}: let "
                                       "the run end, or run it again with --resume")
-    if run and len(run.numbers) == len(estimate):
-        numbers, sequence = run.numbers, run.sequence
+    if run and len(run) == len(estimate):
+        numbers, sequence = [frame.number for frame in run.frames], run.numbers
     else:
         every = whole or list(range(len(truth)))
         some, sequence = [number for number in every if is_chosen(number)], []

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _egosgm
-from ..arguments import counted, decimal, expect_new_file, Parser, read_json, tell
+from ..arguments import counted, decimal, Parser, read_json, tell
 from .points import cloud_of_maps, write_new_ply
 
 
@@ -124,7 +124,7 @@ def main(arguments: Sequence[str]) -> int:
     folder = pathlib.Path(given.run)
     calibration, frames, poses, lost = _frames_of(folder)
     file = pathlib.Path(given.out) if given.out else folder / "cloud.ply"
-    expect_new_file("--out", file)
+    _egosgm._expect_new_file("--out", file)
     grid, taken, pixels = VoxelGrid(given.voxel), 0, 0
     for (name, left), pose in zip(frames, poses):
         disparity, variance = (_map_of(folder, name, kind) for kind in ("disparity", "variance"))
