@@ -19,6 +19,7 @@ import sys
 import tempfile
 import threading
 import unittest
+import warnings
 import zlib
 
 PROGRAM = os.environ["EGOSGM_PROGRAM"]
@@ -52,7 +53,8 @@ def in_this_process(arguments, cwd):
     before, out, errors = os.getcwd(), io.StringIO(), io.StringIO()
     os.chdir(cwd or before)
     try:
-        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(errors):
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(errors), warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # as outside of unittest
             code = run_tool(arguments)
     finally:
         os.chdir(before)
