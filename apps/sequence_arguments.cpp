@@ -42,20 +42,14 @@ std::string words_of(const std::vector<std::pair<const char*, std::string>>& opt
   return text;
 }
 
-}  // namespace
-
-void add_pair_by(CLI::App& command, std::string& pair_by, const std::string& group) {
-  OptionGroup options(command, group);
-  options.add("--pair-by", pair_by, "name|order",
-              "what tells which --left and --right images belong together: equal texts in their names (what * or "
-              "%d stands for), or their order");
-}
-
+/// "name", "order" or empty. Throws InvalidArgument.
 vision::PairBy parse_pair_by(const std::string& pair_by) {
   if (pair_by.empty() || pair_by == "name") return vision::PairBy::kName;
   if (pair_by == "order") return vision::PairBy::kOrder;
   throw InvalidArgument("--pair-by " + pair_by + ": choose name or order");
 }
+
+}  // namespace
 
 void SequenceArguments::add_to(CLI::App& command) {
   const std::string heading = "Input (one of)";
@@ -77,7 +71,9 @@ void SequenceArguments::add_to(CLI::App& command) {
             "calibration of --left and --right, or of a folder without one: KITTI's, Middlebury's, or fx, fy, cx, cy, "
             "baseline_m; with the "
             "Python package, of whichever program");
-  add_pair_by(command, pair_by, heading);
+  input.add("--pair-by", pair_by, "name|order",
+            "what tells which --left and --right images belong together: equal texts in their names (what * or "
+            "%d stands for), or their order");
   input.add("--frames", frames, "FIRST:LAST", "frame numbers, both ends included: 7:10, 7:, :10 or 7; without: all");
 }
 

@@ -66,12 +66,6 @@ void add_motion(CLI::App& command, std::string& poses_file, StereoOdometryOption
 /// Adds --max-translation and --max-rotation.
 void add_motion_bounds(CLI::App& command, StereoOdometryOptions& options, const std::string& group);
 
-/// Adds --pair-by.
-void add_pair_by(CLI::App& command, std::string& pair_by, const std::string& group);
-
-/// "name", "order" or empty. Throws InvalidArgument.
-vision::PairBy parse_pair_by(const std::string& pair_by);
-
 /// `text` as a word of a shell's command.
 std::string shell_word(const std::string& text);
 

@@ -112,13 +112,6 @@ Size read_image_size(const std::filesystem::path& file) {
   }
 }
 
-PixelType read_pixel_type(const std::filesystem::path& file) {
-  constexpr std::size_t kBitDepth = 24;  // the byte of a PNG that holds it
-  const std::string start = read_file_start(file, kPngHeaderBytes);
-  const bool has_16_bits = !starts_like_jpeg(start) && start.size() > kBitDepth && start[kBitDepth] == 16;
-  return has_16_bits ? PixelType::kU16 : PixelType::kU8;
-}
-
 void write_png(const std::filesystem::path& file, const Image& image) {
   const ImageType type = image.type;
   if (image.empty() || type.channel == ChannelType::kF32 || (type.channels != 1 && type.channels != 3)) {

@@ -37,10 +37,6 @@ EGOSGM_EXPORT bool holds_8_bits_in_16(const Image& grey);
 /// Thread-safe.
 EGOSGM_EXPORT Size read_image_size(const std::filesystem::path& file);
 
-/// Reads the type of grey values from the header of a PNG or JPEG; kU8 of anything else. Throws InvalidArgument where
-/// it cannot be read.
-EGOSGM_EXPORT PixelType read_pixel_type(const std::filesystem::path& file);
-
 /// Writes kU8, kBgr8, kU16 or kBgr16, whole or not at all. Throws IoError, and InvalidArgument for another type
 /// or an empty image. Thread-safe for different files.
 EGOSGM_EXPORT void write_png(const std::filesystem::path& file, const Image& image);
