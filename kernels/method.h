@@ -136,7 +136,7 @@
 // and REACH to all sides, one moves for every SHARE that do not: then the pixel is marked.
 #define EGOSGM_DYNAMIC_ALIKE_PX 1.0f
 #define EGOSGM_DYNAMIC_ALIKE_PART 0.03f
-#define EGOSGM_DYNAMIC_REACH 2
+#define EGOSGM_DYNAMIC_REACH 3
 #define EGOSGM_DYNAMIC_SHARE 3
 
 // Reasons looks this many pixels to all sides for texture: it is flat where grey values two columns apart differ by
