@@ -163,7 +163,8 @@ void MethodOptions::validate() const {
          "choose 0 (the same penalty everywhere) to 255");
   expect("banded_sgm.p1", banded_sgm.p1, banded_sgm.p1 >= 0 && banded_sgm.p1 <= banded_sgm.p2,
          "choose 0 to banded_sgm.p2");
-  expect("banded_sgm.right_row_step", banded_sgm.right_row_step, banded_sgm.right_row_step >= 1, "choose 1 or more");
+  expect("banded_sgm.right_row_step", banded_sgm.right_row_step,
+         banded_sgm.right_row_step == 1 || banded_sgm.right_row_step == 2, "choose 1 or 2");
   expect("banded_sgm.s_max", banded_sgm.s_max, banded_sgm.s_max >= 1 && banded_sgm.s_max <= 32767, "choose 1 to 32767");
   expect("banded_sgm.max_memory_mib", banded_sgm.max_memory_mib, banded_sgm.max_memory_mib >= 0,
          "choose 0 (what the device has) or more");

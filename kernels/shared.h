@@ -54,6 +54,16 @@ typedef struct {
 // Maps and images of a stereo pair lie in one buffer, the left view first: index view * width * height + y * width + x.
 #define EGOSGM_LEFT 0
 #define EGOSGM_RIGHT 1
+#ifndef __cplusplus
+// Of the right view, a frame with a prediction has every so many-th row, from the first one on. What lies between is
+// neither written nor read.
+static inline int row_step_of(const int view, const int right_row_step) {
+  return view == EGOSGM_LEFT ? 1 : right_row_step;
+}
+static inline bool has_row(const WorkItem at, const int right_row_step) {
+  return at.y % row_step_of(at.view, right_row_step) == 0;
+}
+#endif
 
 // Disparities are matched in chunks of this many lanes: one, or an even number of them.
 #define EGOSGM_LANES 8
@@ -133,9 +143,9 @@ typedef struct {
   i32 padding;  // of the census codes' rows
   i32 p1, s_max;
   f32 variance_floor, variance_per_step, variance_per_square;
-  i32 reads_off;       // whether the left view leaves ranks for the right one (sgm_cells.h)
-  i32 right_row_step;  // every so many-th row of the right view is matched, from its first one on
-  i32 first_view;      // of those that are matched, which lie one behind the other in what only a match needs
+  i32 reads_off;  // whether the left view leaves ranks for the right one (sgm_cells.h)
+  i32 right_row_step;
+  i32 first_view;  // of those that are matched, which lie one behind the other in what only a match needs
 } SgmParameters;
 
 // Parameters of KalmanUpdate. Without a gate (gate_px infinite), all that is predicted and measured is averaged, and
@@ -147,6 +157,7 @@ typedef struct {
   i32 has_evidence;  // else what the frame knows of evidence is not read, and all that lives is confirmed
   i32 repeats;       // the images are those of the frame before, which make nobody surer
   i32 sees_again;    // the camera stands: what has no prediction was turned down a frame before
+  i32 right_row_step;
 } KalmanParameters;
 
 // The motion of a view's disparity space (eqs. 1-4): rows 1, 2 and 4 of H = Gamma T Gamma^-1; row 3 is (0, 0, 1, 0).
@@ -154,13 +165,14 @@ typedef struct {
 typedef struct {
   f32 x[4], y[4], w[4];
   f32 cx, cy, doffs;
+  i32 row_step;  // of the view's rows, every so many-th is moved, and landed on
   f32 noise_dd, noise_dx, noise_dy, noise_xx, noise_xy, noise_yy;
 } DisparityMotion;
 
 #ifdef __cplusplus
 static_assert(sizeof(ImageSize) == 8 && sizeof(DisparityRange) == 8 && sizeof(Band) == 8 && sizeof(RowSum) == 8 &&
                   sizeof(BlockRange) == 12 && sizeof(EvidenceSum) == 8 && sizeof(SgmParameters) == 52 &&
-                  sizeof(KalmanParameters) == 32 && sizeof(DisparityMotion) == 84,
+                  sizeof(KalmanParameters) == 36 && sizeof(DisparityMotion) == 88,
               "kernels/*.cl read these layouts");
 }  // namespace egosgm::shared
 #endif

@@ -147,8 +147,7 @@ TEST(House, EveryKernelHasItsHostItsReferenceAndItsTest) {
     const std::string name = kernel.stem();
     EXPECT_TRUE(names.insert(name).second) << kernel << ": programs go by the names of their files";
     // A second way to a stage's bits, or its last part, shares its reference and its test, which runs all of them.
-    const std::string stage =
-        name == "banded_sgm_paths" || name == "read_off" || name == "row_interpolation" ? "banded_sgm" : name;
+    const std::string stage = name == "banded_sgm_paths" || name == "read_off" ? "banded_sgm" : name;
     const std::string host = "host/stages/" + name, reference = "tests/reference/" + stage;
     for (const std::string& file :
          {host + ".h", host + ".cpp", reference + ".h", reference + ".cpp", "tests/stages/" + stage + "_test.cpp"}) {

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "tests/reference/pipeline.h"
+#include "tests/reference/present_rows.h"
 #include "tests/support/compare.h"
 #include "tests/support/pipeline_video.h"
 #include "tests/support/stage_chain.h"
@@ -19,59 +20,57 @@ reference::Pipeline make_reference(const Setting& setting) {
   return {setting.size, setting.options, BandedSgm::code_padding(range_of(setting.options))};
 }
 
-/// Of the first `views` views, where a map has any.
+/// Of a map of `size` the rows of `views`.
 template <typename T>
-std::vector<T> of_views(const std::vector<T>& both, int views) {
-  return {both.begin(), both.begin() + static_cast<std::ptrdiff_t>(both.size() / 2 * views)};
+std::vector<T> of_views(const std::vector<T>& both, Views views, shared::ImageSize size) {
+  std::vector<T> present = both.empty() ? both : reference::without_absent_rows(size, views.right_row_step, both, T{});
+  present.resize(both.size() / 2 * static_cast<std::size_t>(views.count));
+  return present;
 }
 
 /// Of the maps that were looked at.
 void expect_same(const std::string& stage, const HostMaps& actual, const HostMaps& expected, shared::ImageSize size,
-                 int views = 2) {
-  if (!actual.disparity.empty()) {
-    EXPECT_TRUE(same_bits(of_views(actual.disparity, views), of_views(expected.disparity, views), size))
-        << "disparity of " << stage;
-  }
-  if (!actual.variance.empty()) {
-    EXPECT_TRUE(same_bits(of_views(actual.variance, views), of_views(masked(expected).variance, views), size))
-        << "variance of " << stage;
-  }
-  if (!actual.doubtful.empty()) {
-    EXPECT_TRUE(same_bits(of_views(actual.doubtful, views), of_views(expected.doubtful, views), size))
-        << "doubts of " << stage;
-  }
+                 Views views = Views::kBoth) {
+  const auto same = [&](const auto& of_actual, const auto& of_expected) {
+    return of_actual.empty() ? ::testing::AssertionSuccess()
+                             : same_bits(of_views(of_actual, views, size), of_views(of_expected, views, size), size);
+  };
+  EXPECT_TRUE(same(actual.disparity, expected.disparity)) << "disparity of " << stage;
+  EXPECT_TRUE(same(actual.variance, masked(expected).variance)) << "variance of " << stage;
+  EXPECT_TRUE(same(actual.doubtful, expected.doubtful)) << "doubts of " << stage;
+  EXPECT_TRUE(same(actual.hidden, expected.hidden)) << "hidden of " << stage;
 }
 
 /// `views`: that are matched.
-void expect_same(const reference::Pass& actual, const reference::Pass& expected, const Setting& setting, int views) {
+void expect_same(const reference::Pass& actual, const reference::Pass& expected, const Setting& setting, Views views) {
   const shared::ImageSize size = setting.size;
   const int padding = BandedSgm::code_padding(range_of(setting.options));
   const int words = Census::words(setting.options.banded_sgm.cost);
+  const auto same = [&](const auto& of_actual, const auto& of_expected, shared::ImageSize rows) {
+    return same_bits(of_views(of_actual, views, rows), of_views(of_expected, views, rows), rows);
+  };
   EXPECT_TRUE(same_bits(actual.images, expected.images, size)) << "images";
   EXPECT_TRUE(same_bits(actual.coarse, expected.coarse, CoarseMatch::coarse_size(size))) << "coarse match";
-  EXPECT_TRUE(same_bits(of_views(actual.band.bands, views), of_views(expected.band.bands, views), size)) << "bands";
-  EXPECT_TRUE(same_bits(of_views(actual.band.cell_offsets, views), of_views(expected.band.cell_offsets, views), size))
-      << "cell offsets";
-  EXPECT_TRUE(
-      same_bits(of_views(actual.band.row_sums, views), of_views(expected.band.row_sums, views), {1, size.height}))
-      << "row sums";
+  EXPECT_TRUE(same(actual.band.bands, expected.band.bands, size)) << "bands";
+  EXPECT_TRUE(same(actual.band.cell_offsets, expected.band.cell_offsets, size)) << "cell offsets";
+  EXPECT_TRUE(same(actual.band.row_sums, expected.band.row_sums, {1, size.height})) << "row sums";
   EXPECT_TRUE(same_bits(actual.codes, expected.codes, {(size.width + 2 * padding) * words, size.height})) << "codes";
-  EXPECT_TRUE(
-      same_bits(of_views(actual.penalties, views), of_views(expected.penalties, views), {4 * size.width, size.height}))
-      << "penalties";
-  expect_same("matched", actual.matched, expected.matched, size);
-  expect_same("smoothed", actual.smoothed, expected.smoothed, size);
+  EXPECT_TRUE(same(actual.penalties, expected.penalties, {4 * size.width, size.height})) << "penalties";
+  const Views measured{2, views.right_row_step};
+  expect_same("matched", actual.matched, expected.matched, size, measured);
+  expect_same("smoothed", actual.smoothed, expected.smoothed, size, measured);
   ASSERT_FALSE(actual.measured.disparity.empty());
   expect_same("measured", actual.measured, expected.measured, size, views);
 }
 
 void expect_same(const reference::Frame& actual, const reference::Frame& expected, const Setting& setting) {
-  const int tracked = setting.options.track_right ? 2 : 1, matched = expected.predicted.disparity.empty() ? 2 : tracked;
+  const Views tracked{expected.tracked_views, expected.right_row_step};
+  const Views matched = expected.predicted.disparity.empty() ? Views::kBoth : tracked;
+  const Views both{2, tracked.right_row_step};
   expect_same("warped", actual.warped, expected.warped, setting.size, tracked);
   expect_same("without_edges", actual.without_edges, expected.without_edges, setting.size, tracked);
   expect_same("filled", actual.filled, expected.filled, setting.size, tracked);
   expect_same("predicted", actual.predicted, expected.predicted, setting.size, tracked);
-  EXPECT_EQ(of_views(actual.predicted.hidden, tracked), of_views(expected.predicted.hidden, tracked));
   ASSERT_EQ(actual.predicted.disparity.empty(), expected.predicted.disparity.empty());
   ASSERT_EQ(actual.passes.size(), expected.passes.size());
   for (std::size_t pass = 0; pass < actual.passes.size(); ++pass) {
@@ -79,11 +78,11 @@ void expect_same(const reference::Frame& actual, const reference::Frame& expecte
     expect_same(actual.passes[pass], expected.passes[pass], setting, matched);
   }
   expect_same("fused", actual.fused, expected.fused, setting.size, tracked);
-  expect_same("fused_smoothed", actual.fused_smoothed, expected.fused_smoothed, setting.size);
-  expect_same("updated", actual.updated, expected.updated, setting.size);
-  expect_same("result", actual.result, expected.result, setting.size);
+  expect_same("fused_smoothed", actual.fused_smoothed, expected.fused_smoothed, setting.size, both);
+  expect_same("updated", actual.updated, expected.updated, setting.size, both);
+  expect_same("result", actual.result, expected.result, setting.size, both);
   if (Evidence::is_of(setting.options)) {
-    EXPECT_EQ(of_views(actual.evidence, tracked), of_views(expected.evidence, tracked)) << "evidence";
+    EXPECT_EQ(of_views(actual.evidence, tracked, setting.size), of_views(expected.evidence, tracked, setting.size));
   }
   EXPECT_TRUE(same_bits(actual.output, expected.output, setting.size)) << "disparity that is published";
   EXPECT_TRUE(same_bits(actual.dynamic, expected.dynamic, setting.size)) << "dynamic map";
@@ -126,8 +125,7 @@ void expect_report(const FrameReport& report, const reference::Frame& expected, 
   double searched = 0;
   const bool has_prediction = !expected.predicted.disparity.empty();
   const int views = has_prediction && !setting.options.track_right ? 1 : 2;
-  const bool has_bands = has_prediction && setting.options.search != SearchMode::kFull;
-  const int right_row_step = has_bands ? setting.options.banded_sgm.right_row_step : 1;
+  const int right_row_step = expected.right_row_step;
   for (const reference::Pass& pass : expected.passes) {
     for (std::size_t i = 0; i < views * pixel_count(setting.size); ++i) {
       const int row = static_cast<int>(i / setting.size.width), right_row = row - setting.size.height;

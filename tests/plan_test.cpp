@@ -9,7 +9,10 @@
 namespace egosgm {
 namespace {
 
-std::string text_of(Views views) { return views == Views::kBoth ? "both" : "left"; }
+std::string text_of(Views views) {
+  if (views == Views::kLeft) return "left";
+  return views.right_row_step == 1 ? "both" : "both, half of the right rows";
+}
 
 /// What is decided, in a row.
 std::string row(const MethodOptions& options, std::optional<Unpredicted> why_no_belief, bool knows_offset,
@@ -44,7 +47,12 @@ constexpr Case kCases[] = {
     {true, kBand, false, kFirstFrame, false, "first frame | everything | tracks left | matches both x1"},
     {true, kBand, false, kReset, true, "reset | everything | tracks left | matches both x1"},
     {true, kBand, false, kReset, false, "reset | everything | tracks left | matches both x1"},
-    {true, kBand, true, {}, true, "- | bands | tracks both | matches both x1 | coarse"},
+    {true,
+     kBand,
+     true,
+     {},
+     true,
+     "- | bands | tracks both, half of the right rows | matches both, half of the right rows x1 | coarse"},
     {true, kBand, true, {}, false, "no motion | everything | tracks both | matches both x1"},
     {true, kBand, true, kFirstFrame, true, "first frame | everything | tracks both | matches both x1"},
     {true, kBand, true, kFirstFrame, false, "first frame | everything | tracks both | matches both x1"},
@@ -100,7 +108,8 @@ TEST(Plan, MatchesTwiceWhereTheFirstMatchGivesTheVerticalOffset) {
 TEST(Plan, HasACoarseMatchOnlyWhereItIsOn) {
   MethodOptions options;
   options.coarse_match.enabled = false;
-  EXPECT_EQ(row(options, {}, true, true), "- | bands | tracks both | matches both x1");
+  EXPECT_EQ(row(options, {}, true, true),
+            "- | bands | tracks both, half of the right rows | matches both, half of the right rows x1");
 }
 
 TEST(Plan, MakesOnlyWhatIsWanted) {

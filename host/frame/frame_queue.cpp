@@ -93,16 +93,17 @@ void FrameQueue::submit(const ImageView& left, const ImageView& right, const std
   if (under_way() > 0) context_.let_wait(ocl::Queue::kKernels, under_way_.back().transfer->scratch_fetched());
   const FrameResults results = method_.frame(plan, images, belief_, frame.after, frame.transfer->output());
   const Workspace& workspace = method_.workspace();
-  frame.transfer->download({.result = results.output,
-                            .predicted = plan.predicts() ? &workspace.prediction.maps : nullptr,
-                            .measured = results.measured,
-                            .bands = workspace.bands,
-                            .matched = plan.matched,
-                            .parts = {plan.matches, &method_.matcher().banded_sgm().stripes(),
-                                      plan.has_coarse_match ? method_.search().coarse_cells() : 0, plan.right_row_step},
-                            .offset = results.offset,
-                            .published = workspace.published.maps(wanted)},
-                           outputs);
+  frame.transfer->download(
+      {.result = results.output,
+       .predicted = plan.predicts() ? &workspace.prediction.maps : nullptr,
+       .measured = results.measured,
+       .bands = workspace.bands,
+       .matched = plan.matched,
+       .parts = {plan.matches, &method_.matcher().banded_sgm().stripes(),
+                 plan.has_coarse_match ? method_.search().coarse_cells() : 0, plan.matched.right_row_step},
+       .offset = results.offset,
+       .published = workspace.published.maps(wanted)},
+      outputs);
   context_.flush();
 
   drain.is_dismissed = true;

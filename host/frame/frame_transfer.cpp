@@ -110,7 +110,7 @@ void FrameTransfer::download(const FrameOnDevice& frame, const FrameOutputs& out
   if (wanted.has(Output::kSearchWidth)) {
     fetch(frame.bands.bands.get(), pixel_count(size_) * sizeof(shared::Band), Output::kSearchWidth);
   }
-  row_sums_.resize(static_cast<std::size_t>(count(frame.matched)) * size_.height);
+  row_sums_.resize(static_cast<std::size_t>(frame.matched.count) * size_.height);
   fetch(frame.bands.row_sums.get(), row_sums_.size() * sizeof(shared::RowSum), row_sums_.data());
   fetch(frame.offset.terms.get(), sizeof(float), &vertical_offset_px_);
 

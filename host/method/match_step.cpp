@@ -28,16 +28,17 @@ MatchStep::MatchStep(ocl::Context& context, shared::ImageSize size, const Method
 void MatchStep::measure(const Plan& plan, const FrameImages& images, const SearchBands& bands, Matching& matching,
                         StereoMaps& measured) {
   const bool reads_off = plan.matched == Views::kLeft;
+  const Views views = reads_off ? Views::kBoth : plan.matched;
   StereoMaps matched{matching.matched, measured.variance};
   if (reads_off) {
     matcher_.reading_off(images, bands, matched);
   } else {
-    matcher_.match(images, bands, matched, Views::kBoth, plan.right_row_step);
+    matcher_.match(images, bands, matched, plan.matched);
   }
-  if (median_filter_) median_filter_->filter(matching.matched, matching.smoothed, Views::kBoth);
+  if (median_filter_) median_filter_->filter(matching.matched, matching.smoothed, views);
   const Map& smoothed = median_filter_ ? matching.smoothed : matching.matched;
   consistency_.check(smoothed, reads_off ? left_right_.read_off_px : left_right_.measurement_px, OutsideView::kDrop,
-                     measured.disparity, Views::kBoth);
+                     measured.disparity, views);
   if (removes_speckles(plan)) speckle_removal_.remove(measured.disparity, plan.matched);
 }
 

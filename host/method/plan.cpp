@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/method/plan.h"
 
+#include "host/stages/evidence.h"
+
 namespace egosgm {
 namespace {
 
@@ -25,8 +27,10 @@ Plan plan_of(const MethodOptions& options, std::optional<Unpredicted> why_no_bel
   plan.motion = plan.predicts() ? motion : std::nullopt;
   plan.search = searches_bands ? Search::kBands : Search::kEverything;
   plan.tracked = options.track_right ? Views::kBoth : Views::kLeft;
+  if (searches_bands && options.track_right && Evidence::is_of(options)) {
+    plan.tracked.right_row_step = options.banded_sgm.right_row_step;
+  }
   plan.matched = plan.predicts() ? plan.tracked : Views::kBoth;
-  plan.right_row_step = plan.search == Search::kBands && options.track_right ? options.banded_sgm.right_row_step : 1;
   plan.matches = options.vertical_alignment.enabled && !knows_offset ? 2 : 1;
   plan.has_coarse_match = searches_bands && options.coarse_match.enabled;
   plan.repeats = repeats;

@@ -18,10 +18,9 @@ struct Plan {
   std::optional<Unpredicted> why_not;  // there is no prediction
   std::optional<Motion> motion;        // by which it is made
   Search search;
-  Views tracked;       // predicted and fused
-  Views matched;       // where it is the left one, the right one is read off its match
-  int right_row_step;  // every so many-th row of the right view is matched, where it is
-  int matches;         // 2 where the first one gives the vertical offset
+  Views tracked;  // predicted and fused
+  Views matched;  // where it is the left one, the right one is read off its match
+  int matches;    // 2 where the first one gives the vertical offset
   bool has_coarse_match;
   bool repeats;         // the images are those of the frame before
   bool sees_again;      // the camera stands, and bands hide most of the range from a pixel without a prediction

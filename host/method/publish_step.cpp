@@ -19,6 +19,7 @@ std::vector<PublishedMap> Published::maps(const Wanted& wanted) const {
 PublishStep::PublishStep(ocl::Context& context, shared::ImageSize size, const Calibration& calibration,
                          const MethodOptions& options)
     : context_(context),
+      row_interpolation_(context, size),
       output_variance_(context, size, options.output_variance),
       reasons_([&context, size, options, repeats = Reasons::repeats(context, size)](PixelType type) {
         return Reasons(context, size, type, options, repeats);
@@ -32,6 +33,15 @@ PublishStep::PublishStep(ocl::Context& context, shared::ImageSize size, const Ca
 void PublishStep::prepare(PixelType type, const Wanted& wanted) {
   if (wanted.has(Output::kReason)) reasons_.prepare(type);
   if (wanted.has(Output::kDynamic) && build_dynamic_map_ && !dynamic_map_) dynamic_map_.emplace(build_dynamic_map_());
+}
+
+void PublishStep::complete_right(const Plan& plan, StereoMaps& belief, StereoMaps& measured, Map& result) {
+  const int step = plan.tracked.right_row_step;
+  if (step == 1 || !plan.wanted.has_right()) return;
+  // The belief comes last, as its variance is that of both.
+  if (result.get()() != belief.disparity.get()()) row_interpolation_.interpolate(step, result, belief.variance);
+  row_interpolation_.interpolate(step, belief.disparity, belief.variance);
+  row_interpolation_.interpolate(step, measured.disparity, measured.variance);
 }
 
 void PublishStep::write(const Plan& plan, const Reasons::Inputs& inputs, const Belief& before, Belief& after,

@@ -11,6 +11,7 @@
 #include "host/stages/dynamic_map.h"
 #include "host/stages/output_variance.h"
 #include "host/stages/reasons.h"
+#include "host/stages/row_interpolation.h"
 
 namespace egosgm {
 
@@ -39,6 +40,9 @@ class PublishStep {
   /// Builds what is wanted of images of `type`.
   void prepare(PixelType type, const Wanted& wanted);
 
+  /// Fills the rows that the right view lacks, in the maps that its wanted outputs are made of. `result`: the
+  /// disparities that are published; they may be the belief's.
+  void complete_right(const Plan& plan, StereoMaps& belief, StereoMaps& measured, Map& result);
   /// Writes what the plan wants. `before`: the belief of the frame before. `after`: this frame's; it keeps the left
   /// image for the next frame's `dynamic` where this frame's is wanted. `variance`: [px^2] of what is published.
   void write(const Plan& plan, const Reasons::Inputs& inputs, const Belief& before, Belief& after, Map& variance,
@@ -46,6 +50,7 @@ class PublishStep {
 
  private:
   ocl::Context& context_;
+  RowInterpolation row_interpolation_;
   OutputVariance output_variance_;
   std::function<DynamicMap()> build_dynamic_map_;  // null: frames have no prediction
   std::optional<DynamicMap> dynamic_map_;          // once it was wanted

@@ -160,7 +160,6 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
                   .right_row_step = 1,
                   .first_view = 0},
       launches_(launches),
-      row_interpolation_(context, size_),
       no_ranks_(context, 1) {
   if (follows_paths(context, options.scheduling)) {
     paths_.emplace(context, size_, range, options, group ? *group : BandedSgmPaths::default_group(context, range));
@@ -178,39 +177,38 @@ void BandedSgm::prepare_reading_off() {
   read_off_.emplace(context_, size_, parameters_.padding);
 }
 
-void BandedSgm::match(const MatchInputs& image, StereoMaps& measured, Views views, int right_row_step) {
-  match_stripes(image, measured, views, {.reads_off = false, .row_step = right_row_step});
+void BandedSgm::match(const MatchInputs& image, StereoMaps& measured, Views views) {
+  match_stripes(image, measured, views, /*reads_off=*/false);
 }
 
 void BandedSgm::reading_off(const MatchInputs& image, StereoMaps& measured) {
-  match_stripes(image, measured, Views::kLeft, {.reads_off = true, .row_step = 1});
+  match_stripes(image, measured, Views::kLeft, /*reads_off=*/true);
 }
 
-void BandedSgm::match_stripes(const MatchInputs& image, StereoMaps& measured, Views views, const Way& way) {
+void BandedSgm::match_stripes(const MatchInputs& image, StereoMaps& measured, Views views, bool reads_off) {
   context_.enter("BandedSgm");
-  if (!stripe_memory_) return match(image, measured, views, way);
+  if (!stripe_memory_) return match(image, measured, views, reads_off);
   for (const Stripe& stripe : stripes_) {
     stripe_memory_->load(image, stripe);
-    match(stripe_memory_->inputs(), stripe_memory_->measured(), views, way);
+    match(stripe_memory_->inputs(), stripe_memory_->measured(), views, reads_off);
     stripe_memory_->store(stripe, measured);
   }
 }
 
-void BandedSgm::match(const MatchInputs& inputs, StereoMaps& measured, Views views, const Way& way) {
+void BandedSgm::match(const MatchInputs& inputs, StereoMaps& measured, Views views, bool reads_off) {
   shared::SgmParameters parameters = parameters_;
-  parameters.reads_off = way.reads_off;
-  parameters.right_row_step = way.row_step;
-  if (way.reads_off) read_off_->clear();
+  parameters.reads_off = reads_off;
+  parameters.right_row_step = views.right_row_step;
+  if (reads_off) read_off_->clear();
   if (paths_) {
     paths_->match(parameters, inputs, measured, ranks(), views);
   } else {
-    const int at_once = std::min(wavefront_->views, count(views));
-    for (parameters.first_view = 0; parameters.first_view < count(views); parameters.first_view += at_once) {
+    const int at_once = std::min(wavefront_->views, views.count);
+    for (parameters.first_view = 0; parameters.first_view < views.count; parameters.first_view += at_once) {
       sweep(parameters, inputs, measured, at_once);
     }
   }
-  if (way.reads_off) read_off_->read_off(parameters, measured);
-  if (way.row_step > 1) row_interpolation_.interpolate(parameters, measured);
+  if (reads_off) read_off_->read_off(parameters, measured);
 }
 
 void BandedSgm::sweep(const shared::SgmParameters& parameters, const MatchInputs& inputs, StereoMaps& measured,

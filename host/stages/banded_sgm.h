@@ -8,7 +8,6 @@
 #include "host/stages/banded_sgm_paths.h"
 #include "host/stages/maps.h"
 #include "host/stages/read_off.h"
-#include "host/stages/row_interpolation.h"
 #include "host/stages/search_band.h"
 #include "host/stages/stripes.h"
 #include "host/tuning_defaults.h"
@@ -54,10 +53,9 @@ class BandedSgm {
   /// The rows of all stripes: rows where stripes overlap are matched more than once.
   int matched_rows() const;
 
-  /// Matches `views`; of the right one every `right_row_step`-th row of a stripe, and fills the rows between. Of the
-  /// inputs' codes, which Census makes with a padding of `code_padding(range)`, both views' are read; of penalties and
-  /// bands, theirs.
-  void match(const MatchInputs& image, StereoMaps& measured, Views views, int right_row_step = 1);
+  /// Matches `views`. Of the inputs' codes, which Census makes with a padding of `code_padding(range)`, both views' are
+  /// read; of penalties and bands, theirs.
+  void match(const MatchInputs& image, StereoMaps& measured, Views views);
   /// Matches the left view, and reads the right one's disparities off its sums: half of the work, whole disparities.
   /// REQUIRES: that was prepared.
   void reading_off(const MatchInputs& image, StereoMaps& measured);
@@ -78,11 +76,6 @@ class BandedSgm {
                                  const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uint>, Map, Map>;
 
  private:
-  /// The way to the right view's disparities.
-  struct Way {
-    bool reads_off;
-    int row_step;
-  };
   struct Wavefront {
     Wavefront(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
               const BandedSgmOptions& options, Tile tile, int views);
@@ -96,8 +89,8 @@ class BandedSgm {
     FromMiddle from_middle;
   };
 
-  void match_stripes(const MatchInputs& image, StereoMaps& measured, Views views, const Way& way);
-  void match(const MatchInputs& inputs, StereoMaps& measured, Views views, const Way& way);
+  void match_stripes(const MatchInputs& image, StereoMaps& measured, Views views, bool reads_off);
+  void match(const MatchInputs& inputs, StereoMaps& measured, Views views, bool reads_off);
   void sweep(const shared::SgmParameters& parameters, const MatchInputs& inputs, StereoMaps& measured, int views);
   ocl::Buffer<cl_uint>& ranks() { return read_off_ ? read_off_->ranks() : no_ranks_; }
 
@@ -106,7 +99,6 @@ class BandedSgm {
   const std::vector<Stripe> stripes_;
   const shared::SgmParameters parameters_;
   const Launches launches_;
-  RowInterpolation row_interpolation_;
   std::optional<ReadOff> read_off_;
   ocl::Buffer<cl_uint> no_ranks_;              // in place of ReadOff's
   std::optional<StripeMemory> stripe_memory_;  // where there is more than one

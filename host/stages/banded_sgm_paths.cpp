@@ -83,8 +83,8 @@ void BandedSgmPaths::follow(int pass, const shared::SgmParameters& parameters, c
   const int first_lines = pass == 0 ? height : width, second_lines = paths_ == 8 ? diagonals : width;
   const int groups = groups_of(first_lines, group_.lines) + groups_of(second_lines, group_.lines);
   const int work_items = group_.lanes * group_.lines;
-  const ocl::Range lines{cl::NDRange(work_items, groups, 2 * count(views)), cl::NDRange(work_items, 1, 1)};
-  const cl_int view_count = count(views);
+  const ocl::Range lines{cl::NDRange(work_items, groups, 2 * views.count), cl::NDRange(work_items, 1, 1)};
+  const cl_int view_count = views.count;
   stage_.launch(follow_paths_, lines, parameters, pass, view_count, inputs.codes, inputs.penalties, inputs.bands.bands,
                 inputs.bands.cell_offsets, forward_first_, forward_second_, backward_first_, backward_second_);
 }
@@ -95,7 +95,7 @@ void BandedSgmPaths::match(const shared::SgmParameters& parameters, const MatchI
   const int work_items = group_.lanes * group_.lines;
   const int groups_a_row = groups_of(stage_.size().width, group_.lines);
   const ocl::Range pixels{
-      cl::NDRange(static_cast<std::size_t>(groups_a_row) * work_items, stage_.size().height, count(views)),
+      cl::NDRange(static_cast<std::size_t>(groups_a_row) * work_items, stage_.size().height, views.count),
       cl::NDRange(work_items, 1, 1)};
   stage_.launch(find_winners_, pixels, parameters, inputs.codes, inputs.bands.bands, inputs.bands.cell_offsets,
                 forward_first_, forward_second_, backward_first_, backward_second_, measured.disparity,

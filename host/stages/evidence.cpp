@@ -45,7 +45,7 @@ void Evidence::operator()(const ocl::Buffer<cl_uint>& codes, const CoarseView* c
     coarse_census_.encode(coarse->images, coarse_codes_);
     coarse_census_.encode_alike(coarse->images, alike_);
   }
-  const ocl::Range each = ocl::every_pixels(stage_.enter(), coarse_, stage_.pixels(), count(views));
+  const ocl::Range each = ocl::every_pixels(stage_.enter(), coarse_, stage_.pixels(), views.count);
   stage_.launch(compare_, each, stage_.size(), gate_px_, padding_, codes, coarse != nullptr, coarse_padding_,
                 coarse_codes_, alike_, predicted, measured, sums_);
   stage_.launch(gather_, each, stage_.size(), coarse != nullptr, coarse_padding_,
@@ -55,7 +55,8 @@ void Evidence::operator()(const ocl::Buffer<cl_uint>& codes, const CoarseView* c
 void Evidence::begin(FlagMap& evidence) { evidence.fill(stage_.enter(), EGOSGM_EVIDENCE_TRUSTED); }
 
 void Evidence::publish(const Map& disparity, const FlagMap& evidence, Map& confirmed, Views views, Views tracked) {
-  stage_.launch_pixels(publish_, count(views), tracked == Views::kLeft, disparity, evidence, confirmed);
+  stage_.launch_pixels(publish_, views.count, views.right_row_step, tracked == Views::kLeft, disparity, evidence,
+                       confirmed);
 }
 
 }  // namespace egosgm

@@ -55,6 +55,7 @@ shared::DisparityMotion disparity_motion(const Calibration& calibration, const M
   const bool is_right = view == EGOSGM_RIGHT;
 
   shared::DisparityMotion result{};
+  result.row_step = 1;
   set_row(result.x, h, 0);
   set_row(result.y, h, 1);
   set_row(result.w, h, 3);
@@ -102,24 +103,25 @@ void ForwardWarp::warp(const StereoMaps& belief, const FlagMap& evidence, const 
   Motion motion = current_from_previous;
   motion.covariance *= static_cast<double>(options_.motion_noise);
   const shared::DisparityMotion left = disparity_motion(calibration_, motion, EGOSGM_LEFT);
-  const shared::DisparityMotion right = disparity_motion(calibration_, motion, EGOSGM_RIGHT);
+  shared::DisparityMotion right = disparity_motion(calibration_, motion, EGOSGM_RIGHT);
+  right.row_step = views.right_row_step;
   if (bands_) {
     auto& [find_spans, splat_bands, spans] = *bands_;
     const int bands = (size.height + band_rows_ - 1) / band_rows_;
-    find_spans(context, ocl::every_row(context, size, count(views)), size, left, right, belief.disparity, spans);
-    splat_bands(context, ocl::every_row(context, {1, bands}, count(views)), size, range_, left, right,
+    find_spans(context, ocl::every_row(context, size, views.count), size, left, right, belief.disparity, spans);
+    splat_bands(context, ocl::every_row(context, {1, views.count}, bands), size, range_, left, right,
                 options_.process_noise_px2, band_rows_, spans, belief.disparity, belief.variance, evidence,
                 predicted.disparity, predicted.variance, predicted_evidence);
     return;
   }
   auto& [move, splat_disparity, splat_variance, decode, landed, moved_key, moved_variance, zbuffer, most_evidence] =
       *atomics_;
-  stage_.launch_pixels(move, count(views), range_, left, right, options_.process_noise_px2, belief.disparity,
+  stage_.launch_pixels(move, views.count, range_, left, right, options_.process_noise_px2, belief.disparity,
                        belief.variance, landed, moved_key, moved_variance, zbuffer, predicted.variance, most_evidence);
-  stage_.launch_pixels(splat_disparity, count(views), landed, moved_key, zbuffer);
-  stage_.launch_pixels(splat_variance, count(views), landed, moved_key, moved_variance, zbuffer, predicted.variance,
+  stage_.launch_pixels(splat_disparity, views.count, landed, moved_key, zbuffer);
+  stage_.launch_pixels(splat_variance, views.count, landed, moved_key, moved_variance, zbuffer, predicted.variance,
                        evidence, most_evidence);
-  stage_.launch_pixels(decode, count(views), range_, zbuffer, predicted.disparity, predicted.variance, most_evidence,
+  stage_.launch_pixels(decode, views.count, range_, zbuffer, predicted.disparity, predicted.variance, most_evidence,
                        predicted_evidence);
 }
 

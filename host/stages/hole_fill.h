@@ -21,10 +21,10 @@ class HoleFill {
  private:
   ocl::Stage stage_;
   const float max_difference_px_;
-  ocl::Kernel<const shared::ImageSize, const float, const ocl::Buffer<float>, const ocl::Buffer<float>,
+  ocl::Kernel<const shared::ImageSize, const cl_int, const float, const ocl::Buffer<float>, const ocl::Buffer<float>,
               ocl::Buffer<float>, ocl::Buffer<float>>
       fill_rows_;
-  ocl::Kernel<const shared::ImageSize, const float, const ocl::Buffer<float>, const ocl::Buffer<float>,
+  ocl::Kernel<const shared::ImageSize, const cl_int, const float, const ocl::Buffer<float>, const ocl::Buffer<float>,
               ocl::Buffer<float>, ocl::Buffer<float>, FlagMap>
       fill_columns_;
   StereoMaps rows_filled_;

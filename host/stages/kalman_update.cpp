@@ -18,7 +18,8 @@ KalmanUpdate::KalmanUpdate(ocl::Context& context, shared::ImageSize size, const 
                   .keep_predicted = options.keep_predicted,
                   .has_evidence = false,
                   .repeats = false,
-                  .sees_again = false},
+                  .sees_again = false,
+                  .right_row_step = 1},
       ask_neighbours_(options.ask_neighbours),
       blocks_(CoarseMatch::coarse_size(size)),
       sums_(context, 2 * static_cast<std::size_t>(EGOSGM_EVIDENCE_STRIDE(size.width)) * blocks_.height),
@@ -36,7 +37,7 @@ void KalmanUpdate::update(const FlagMap& hidden, const StereoMaps& predicted, co
                           FlagMap& updated_evidence, Views views) {
   const BlockEvidence& blocks = evidence ? evidence->blocks : none_;
   if (ask_neighbours_) {
-    const ocl::Range each = ocl::every_pixels(stage_.enter(), blocks_, stage_.pixels(), count(views));
+    const ocl::Range each = ocl::every_pixels(stage_.enter(), blocks_, stage_.pixels(), views.count);
     stage_.launch(sum_, each, stage_.size(), parameters_.gate_px, predicted.disparity, measured.disparity, sums_,
                   counts_);
     stage_.launch(find_drift_, each, stage_.size(), sums_, counts_, drifts_);
@@ -45,7 +46,8 @@ void KalmanUpdate::update(const FlagMap& hidden, const StereoMaps& predicted, co
   parameters.has_evidence = evidence != nullptr;
   parameters.repeats = evidence && evidence->repeats;
   parameters.sees_again = evidence && evidence->sees_again;
-  stage_.launch(update_, ocl::every_pixels(stage_.enter(), stage_.size(), stage_.pixels(), count(views)), parameters,
+  parameters.right_row_step = views.right_row_step;
+  stage_.launch(update_, ocl::every_pixels(stage_.enter(), stage_.size(), stage_.pixels(), views.count), parameters,
                 hidden, predicted.disparity, predicted.variance, measured.disparity, measured.variance,
                 evidence ? evidence->before : hidden, blocks.evidence, blocks.found, drifts_, updated.disparity,
                 updated.variance, doubtful, updated_evidence);

@@ -89,8 +89,15 @@ struct Prediction {
         hidden(context, 2 * pixel_count(size)) {}
 };
 
-/// The views that a stage works on. The values are their number.
-enum class Views { kLeft = 1, kBoth = 2 };
-inline int count(Views views) { return static_cast<int>(views); }
+/// The views that a stage works on, and of the right one every so many-th row, from its first on. The rows between are
+/// neither read nor written.
+struct Views {
+  int count = 2;
+  cl_int right_row_step = 1;
+
+  static const Views kLeft, kBoth;
+  friend bool operator==(const Views&, const Views&) = default;
+};
+inline constexpr Views Views::kLeft{1, 1}, Views::kBoth{2, 1};
 
 }  // namespace egosgm

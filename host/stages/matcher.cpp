@@ -18,9 +18,8 @@ void Matcher::prepare(PixelType type) {
   step_penalties_.prepare(type);
 }
 
-void Matcher::match(const FrameImages& images, const SearchBands& bands, StereoMaps& matched, Views views,
-                    int right_row_step) {
-  banded_sgm_.match(inputs(images, bands, views), matched, views, right_row_step);
+void Matcher::match(const FrameImages& images, const SearchBands& bands, StereoMaps& matched, Views views) {
+  banded_sgm_.match(inputs(images, bands, views), matched, views);
 }
 
 void Matcher::reading_off(const FrameImages& images, const SearchBands& bands, StereoMaps& matched) {

@@ -26,8 +26,7 @@ class Matcher {
   void prepare_reading_off() { banded_sgm_.prepare_reading_off(); }
 
   /// See BandedSgm. REQUIRES: the images' type was prepared.
-  void match(const FrameImages& images, const SearchBands& bands, StereoMaps& matched, Views views,
-             int right_row_step = 1);
+  void match(const FrameImages& images, const SearchBands& bands, StereoMaps& matched, Views views);
   void reading_off(const FrameImages& images, const SearchBands& bands, StereoMaps& matched);
 
   const BandedSgm& banded_sgm() const { return banded_sgm_; }

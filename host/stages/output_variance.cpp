@@ -17,11 +17,11 @@ OutputVariance::OutputVariance(ocl::Context& context, shared::ImageSize size, co
 
 void OutputVariance::compute(const Map& output, const StereoMaps& belief, const StereoMaps& measured, Map& variance,
                              Views views) {
-  if (!options_.enabled) return stage_.launch_pixels(keep_, count(views), output, belief.variance, variance);
-  stage_.launch_pixels(of_each_pixel_, count(views), output, belief.disparity, belief.variance, measured.disparity,
+  if (!options_.enabled) return stage_.launch_pixels(keep_, views.count, output, belief.variance, variance);
+  stage_.launch_pixels(of_each_pixel_, views.count, output, belief.disparity, belief.variance, measured.disparity,
                        measured.variance, variance, roughness_);
-  stage_.launch_pixels(row_means_, count(views), variance, roughness_, mean_variance_, mean_roughness_);
-  stage_.launch_pixels(combine_, count(views), options_.scale, options_.roughness_weight, options_.jump_weight, output,
+  stage_.launch_pixels(row_means_, views.count, variance, roughness_, mean_variance_, mean_roughness_);
+  stage_.launch_pixels(combine_, views.count, options_.scale, options_.roughness_weight, options_.jump_weight, output,
                        mean_variance_, mean_roughness_, variance);
 }
 

@@ -3,12 +3,12 @@
 
 namespace egosgm {
 
-RowInterpolation::RowInterpolation(ocl::Context& context, shared::ImageSize size)
-    : stage_(context, "BandedSgm", "row_interpolation.cl", size), interpolate_(stage_, "interpolate_rows") {}
+RowInterpolation::RowInterpolation(ocl::Context& context, shared::ImageSize size, int pixels)
+    : stage_(context, "RowInterpolation", "row_interpolation.cl", size, pixels),
+      interpolate_(stage_, "interpolate_rows") {}
 
-void RowInterpolation::interpolate(const shared::SgmParameters& parameters, StereoMaps& measured) {
-  const ocl::Range right = ocl::every_pixels(stage_.enter(), stage_.size(), stage_.pixels(), /*views=*/1);
-  stage_.launch(interpolate_, right, parameters, measured.disparity, measured.variance);
+void RowInterpolation::interpolate(int right_row_step, Map& disparity, Map& variance) {
+  stage_.launch_pixels(interpolate_, /*views=*/1, right_row_step, disparity, variance);
 }
 
 }  // namespace egosgm

@@ -10,7 +10,7 @@ SadCheck::SadCheck(ocl::Context& context, shared::ImageSize size, PixelType type
       check_(stage_, "check_greys") {}
 
 void SadCheck::check(const ocl::Buffer<cl_uchar>& images, Map& disparity, Views views) {
-  stage_.launch_pixels(check_, count(views), max_difference_, images, disparity);
+  stage_.launch_pixels(check_, views.count, max_difference_, images, disparity);
 }
 
 }  // namespace egosgm

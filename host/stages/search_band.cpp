@@ -59,22 +59,24 @@ SearchBand::SearchBand(ocl::Context& context, shared::ImageSize size, shared::Di
 void SearchBand::narrow(const StereoMaps& predicted, const Map* coarse, SearchBands& bands, Views views) {
   ocl::Context& context = stage_.enter();
   const shared::ImageSize size = stage_.size();
-  const ocl::Range blocks = ocl::every_pixels(context, blocks_, stage_.pixels(), count(views));
+  const ocl::Range blocks = ocl::every_pixels(context, blocks_, stage_.pixels(), views.count);
   if (coarse)
-    stage_.launch(gather_coarse_, ocl::every_pixel(context, blocks_, count(views)), size, *coarse, coarse_ranges_);
-  if (options_.from_neighbours) stage_.launch(gather_blocks_, blocks, size, predicted.disparity, block_ranges_);
+    stage_.launch(gather_coarse_, ocl::every_pixel(context, blocks_, views.count), size, *coarse, coarse_ranges_);
+  if (options_.from_neighbours)
+    stage_.launch(gather_blocks_, blocks, size, views.right_row_step, predicted.disparity, block_ranges_);
   stage_.launch(bands_of_blocks_, blocks, size, range_, options_.from_neighbours, options_.neighbour_margin_px,
                 options_.neighbour_min_count, options_.coarse_margin_px, block_ranges_, coarse ? coarse_ranges_ : none_,
                 found_, block_bands_);
-  stage_.launch_pixels(bands_of_pixels_, count(views), range_, options_.sigmas, options_.min_half_width_px,
-                       predicted.disparity, predicted.variance, options_.coarse_tolerance_px, options_.coarse_margin_px,
-                       found_, block_bands_, bands.bands, bands.cell_offsets, bands.row_sums);
+  stage_.launch_pixels(bands_of_pixels_, views.count, views.right_row_step, range_, options_.sigmas,
+                       options_.min_half_width_px, predicted.disparity, predicted.variance,
+                       options_.coarse_tolerance_px, options_.coarse_margin_px, found_, block_bands_, bands.bands,
+                       bands.cell_offsets, bands.row_sums);
   if (stage_.pixels() == 1) sum_rows(predicted.disparity, bands, views);
 }
 
 void SearchBand::full_range(SearchBands& bands, Views views) {
-  stage_.launch(full_range_, ocl::every_pixel(stage_.enter(), stage_.size(), count(views)), stage_.size(),
-                whole(range_), bands.bands, bands.cell_offsets, bands.row_sums);
+  stage_.launch(full_range_, ocl::every_pixel(stage_.enter(), stage_.size(), views.count), stage_.size(), whole(range_),
+                bands.bands, bands.cell_offsets, bands.row_sums);
 }
 
 void SearchBand::full_range(const Map& predicted, SearchBands& bands, Views views) {
@@ -83,7 +85,8 @@ void SearchBand::full_range(const Map& predicted, SearchBands& bands, Views view
 }
 
 void SearchBand::sum_rows(const Map& predicted, SearchBands& bands, Views views) {
-  stage_.launch_rows(sum_rows_, count(views), predicted, bands.bands, bands.cell_offsets, bands.row_sums);
+  stage_.launch_rows(sum_rows_, views.count, views.right_row_step, predicted, bands.bands, bands.cell_offsets,
+                     bands.row_sums);
 }
 
 }  // namespace egosgm

@@ -25,17 +25,17 @@ void SpeckleRemoval::remove(Map& disparity, Views views) {
   if (options_.max_size_px <= 0) return;
   const shared::ImageSize size = stage_.size();
   const int strips = (size.height + strip_rows_ - 1) / strip_rows_;
-  stage_.launch_rows(find_runs_, count(views), options_.max_difference_px, disparity, runs_, parents_, sizes_);
+  stage_.launch_rows(find_runs_, views.count, options_.max_difference_px, disparity, runs_, parents_, sizes_);
   if (strip_rows_ > 1) {
-    stage_.launch(join_strips_, ocl::every_row(stage_.enter(), {1, strips}, count(views)), size,
+    stage_.launch(join_strips_, ocl::every_row(stage_.enter(), {1, strips}, views.count), size,
                   options_.max_difference_px, strip_rows_, disparity, runs_, parents_);
   }
   if (strips > 1) {
-    stage_.launch(join_seams_, ocl::every_pixel(stage_.enter(), {size.width, strips - 1}, count(views)), size,
+    stage_.launch(join_seams_, ocl::every_pixel(stage_.enter(), {size.width, strips - 1}, views.count), size,
                   options_.max_difference_px, strip_rows_, disparity, runs_, parents_);
   }
-  stage_.launch_pixels(measure_, count(views), runs_, parents_, roots_, sizes_);
-  stage_.launch_pixels(drop_, count(views), max_size_, runs_, roots_, sizes_, disparity);
+  stage_.launch_pixels(measure_, views.count, runs_, parents_, roots_, sizes_);
+  stage_.launch_pixels(drop_, views.count, max_size_, runs_, roots_, sizes_, disparity);
 }
 
 }  // namespace egosgm

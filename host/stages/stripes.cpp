@@ -10,23 +10,31 @@ namespace {
 
 constexpr int kViews = 2;
 
+/// A stripe may begin a row earlier than its overlap asks for.
+int stripe_count(int height, int rows, int overlap) {
+  const int inner = rows - 2 * overlap - 1;
+  return (height + inner - 1) / inner;
+}
+
 }  // namespace
 
 int fewest_rows(int height, int most_rows, int overlap) {
   if (most_rows >= height) return height;
-  const int inner = most_rows - 2 * overlap, count = (height + inner - 1) / inner;
-  return std::min(most_rows, (height + count - 1) / count + 2 * overlap);
+  const int most = most_rows - (height - most_rows) % 2, count = stripe_count(height, most, overlap);
+  const int rows = std::min(most, (height + count - 1) / count + 2 * overlap + 1);
+  return rows + (height - rows) % 2;
 }
 
 std::vector<Stripe> cut_into_stripes(int height, int rows, int overlap) {
   if (rows >= height) return {{0, height, 0, height}};
-  const int inner = rows - 2 * overlap, count = (height + inner - 1) / inner;
+  const int count = stripe_count(height, rows, overlap);
   std::vector<Stripe> stripes;
   for (int i = 0; i < count; ++i) {
     // The stripes have about equal height, rather than a thin one at the end.
     const int begin = static_cast<int>(static_cast<std::int64_t>(height) * i / count);
     const int end = static_cast<int>(static_cast<std::int64_t>(height) * (i + 1) / count);
-    stripes.push_back({std::clamp(begin - overlap, 0, height - rows), rows, begin, end});
+    const int first = std::clamp(begin - overlap, 0, height - rows);
+    stripes.push_back({first - first % 2, rows, begin, end});
   }
   return stripes;
 }

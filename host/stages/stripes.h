@@ -21,11 +21,11 @@ struct Stripe {
 };
 
 /// The least number of rows a stripe, at most `most_rows`, that needs no further stripe: more rows would be matched
-/// twice.
+/// twice. An even number of rows is left, so that all stripes begin with a row that the right view has.
 int fewest_rows(int height, int most_rows, int overlap);
 
 /// Stripes of `rows` matched rows each. Of every stripe, `overlap` rows at either end are not kept, except at the
-/// image's edges. REQUIRES: rows > 2 * overlap or rows == height.
+/// image's edges. REQUIRES: rows > 2 * overlap + 1 and height - rows is even, or rows == height.
 std::vector<Stripe> cut_into_stripes(int height, int rows, int overlap);
 
 /// Memory for what a stripe's match reads and gives, laid out as if the stripe were the image.

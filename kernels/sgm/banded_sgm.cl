@@ -311,7 +311,7 @@ ALWAYS_INLINE void sweep_view(const bool meets, const bool backward, const SgmPa
   sweep.disparities += not_matched;
   sweep.variances += not_matched;
   sweep.row_sums += (size_t)q.first_view * q.height;
-  sweep.row_step = row_step_of(q, q.first_view + sweep.view);
+  sweep.row_step = row_step_of(q.first_view + sweep.view, q.right_row_step);
   sweep.rows = rows_of(q, q.first_view + sweep.view);
   sweep.slots += (size_t)(2 * sweep.view + backward) * SLOTS_OF(q) * SLOT + SLOT_PADDING;
   if (backward) {

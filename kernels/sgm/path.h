@@ -68,7 +68,7 @@ static inline Line line_of(const int width, const int rows, const int direction,
 static inline Path path_of(const SgmParameters q, const int direction, const bool backward, const int view,
                            const Line line) {
   const int sign = backward ? -1 : 1, view_sign = view == EGOSGM_LEFT ? 1 : -1;
-  const int row_step = row_step_of(q, view);
+  const int row_step = row_step_of(view, q.right_row_step);
   const int stride = q.width + 2 * q.padding;
   Path path;
   path.length = line.length;

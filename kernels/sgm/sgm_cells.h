@@ -15,12 +15,9 @@
                       (ushort)(EGOSGM_RANK_ADDED - EGOSGM_RANK_LEAST_QUARTERS * (int)(least) / 4))
 #define NO_RANK 0xffff0000u  // and above: of no left pixel, or of a disparity that it does not search
 
-// Every so many-th row of a view is matched, and so many in all. RowInterpolation fills those between.
-static inline int row_step_of(const SgmParameters q, const int view) {
-  return view == EGOSGM_LEFT ? 1 : q.right_row_step;
-}
+// The number of rows of a view that are matched.
 static inline int rows_of(const SgmParameters q, const int view) {
-  const int step = row_step_of(q, view);
+  const int step = row_step_of(view, q.right_row_step);
   return (q.height + step - 1) / step;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Edge rejection: drops a disparity whose nearest valid neighbour among the next two pixels to the left, right, above
-// or below differs by more than max_jump. Both sides of a jump see each other, so both go.
+// or below, of the rows that the view has, differs by more than max_jump. Both sides of a jump see each other, so both
+// go.
 #include "pixels.h"
 
 // lint: PIXELS=1
@@ -11,17 +12,18 @@ static inline Ints is_jump(const Floats d, const Floats near, const Floats far, 
   return (neighbour > INVALID) & (fabs(neighbour - d) > max_jump);
 }
 
-COMPILED_ONCE void reject_row(const WorkItem at, const ImageSize size, const float max_jump,
+COMPILED_ONCE void reject_row(const WorkItem at, const ImageSize size, const int right_row_step, const float max_jump,
                               global const float* disparity, global float* kept) {
-  const int y = at.y;
-  const int width = size.width;
+  if (!has_row(at, right_row_step)) return;
+  const int y = at.y, step = row_step_of(at.view, right_row_step);
+  const int width = size.width, stride = step * width;
   const size_t row = ((size_t)at.view * size.height + y) * width;
   global const float* here = disparity + row;
   // Above and below the image, the pixel itself is read, which is no jump.
-  global const float* above = here - (y >= 1 ? width : 0);
-  global const float* far_above = above - (y >= 2 ? width : 0);
-  global const float* below = here + (y + 1 < size.height ? width : 0);
-  global const float* far_below = below + (y + 2 < size.height ? width : 0);
+  global const float* above = here - (y >= step ? stride : 0);
+  global const float* far_above = above - (y >= 2 * step ? stride : 0);
+  global const float* below = here + (y + step < size.height ? stride : 0);
+  global const float* far_below = below + (y + 2 * step < size.height ? stride : 0);
 
   FOR_PIXELS(x, width) {
     const Floats d = load_pixels(here, x, width);
@@ -34,6 +36,7 @@ COMPILED_ONCE void reject_row(const WorkItem at, const ImageSize size, const flo
   }
 }
 
-KERNEL void reject(const ImageSize size, const float max_jump, global const float* disparity, global float* kept) {
-  reject_row(THIS_WORK_ITEM, size, max_jump, disparity, kept);
+KERNEL void reject(const ImageSize size, const int right_row_step, const float max_jump, global const float* disparity,
+                   global float* kept) {
+  reject_row(THIS_WORK_ITEM, size, right_row_step, max_jump, disparity, kept);
 }

@@ -48,7 +48,8 @@ static inline Moved move_pixels(const ImageSize size, const DisparityRange range
   moved.disparity = metric_disparity - motion.doffs + 0.0f;  // + 0: there is one zero only
   // Asked of the floats, with comparisons that NaN fails, before any of them becomes an integer.
   const Floats target_x = nearest(u + motion.cx);
-  const Floats target_y = nearest(v + motion.cy);
+  const float rows = motion.row_step;
+  const Floats target_y = rows * nearest((v + motion.cy) * (1.0f / rows));
   moved.lands = (disparity > INVALID) & (w > least_ratio) & (target_x >= zero) & (target_x < (Floats)(size.width)) &
                 (target_y >= zero) & (target_y < (Floats)(size.height)) & (moved.disparity >= (Floats)(range.min));
   moved.x = INTS_OF_FLOATS(moved.lands ? target_x : zero);
@@ -81,7 +82,7 @@ KERNEL void move(const ImageSize size, const DisparityRange range, const Dispari
   const size_t i = ((size_t)view * size.height + y) * size.width + x;
   const DisparityMotion motion = view == EGOSGM_LEFT ? left : right;
   const Moved moved = move_pixels(size, range, motion, process_noise, x, y, disparity[i], variance[i]);
-  landed[i] = moved.lands ? moved.y * size.width + moved.x : -1;
+  landed[i] = moved.lands && y % motion.row_step == 0 ? moved.y * size.width + moved.x : -1;
   moved_key[i] = key_of(moved.disparity);
   moved_variance[i] = moved.variance;
   zbuffer[i] = 0;
@@ -135,7 +136,7 @@ static inline float row_of(const DisparityMotion motion, const float wx, const f
 }
 
 // Rows between which everything lands that a source row's valid disparities [least, most] can land on: the quotient of
-// two linear functions has its extremes in the corners of (x, disparity) where its denominator keeps its sign. A row
+// two linear functions has its extremes in the corners of (x, disparity) where its denominator keeps its sign. A step
 // more on both sides for the rounding; every row where a corner comes near the camera, which makes more of it.
 static inline int2 span_of(const ImageSize size, const DisparityMotion motion, const int y, const float least,
                            const float most) {
@@ -150,7 +151,7 @@ static inline int2 span_of(const ImageSize size, const DisparityMotion motion, c
     first = fmin(first, row);
     last = fmax(last, row);
   }
-  return (int2)((int)floor(first) - 1, (int)ceil(last) + 1);
+  return (int2)((int)floor(first) - motion.row_step, (int)ceil(last) + motion.row_step);
 }
 
 // Between which rows each source row lands; the first lies behind the last where it lands on none. A work-item a row
@@ -160,9 +161,11 @@ COMPILED_ONCE void find_spans_row(const WorkItem at, const ImageSize size, const
   const int y = at.x;
   const int view = at.y;
   const size_t row = (size_t)view * size.height + y;
+  const DisparityMotion motion = view == EGOSGM_LEFT ? left : right;
+  const int width = y % motion.row_step == 0 ? size.width : 0;
   Floats least = INFINITY;
   Floats most = INVALID;
-  for (int x = 0; x < size.width; x += PIXELS) {
+  for (int x = 0; x < width; x += PIXELS) {
     const Floats d = load_pixels(disparity + row * size.width, x, size.width);
     const Floats valid_or_most = d > INVALID ? d : (Floats)(INFINITY);
     least = valid_or_most < least ? valid_or_most : least;
@@ -177,8 +180,7 @@ COMPILED_ONCE void find_spans_row(const WorkItem at, const ImageSize size, const
     mosts[0] = fmax(mosts[0], mosts[i]);
   }
   const bool has_any = mosts[0] > EGOSGM_INVALID_DISPARITY;
-  const int2 span =
-      has_any ? span_of(size, view == EGOSGM_LEFT ? left : right, y, leasts[0], mosts[0]) : (int2)(size.height, -1);
+  const int2 span = has_any ? span_of(size, motion, y, leasts[0], mosts[0]) : (int2)(size.height, -1);
   spans[2 * row] = span.x;
   spans[2 * row + 1] = span.y;
 }
@@ -188,26 +190,30 @@ KERNEL void find_spans(const ImageSize size, const DisparityMotion left, const D
   find_spans_row(THIS_WORK_ITEM, size, left, right, disparity, spans);
 }
 
-// Moves and splats what lands on a band of `band_rows` rows. A work-item a band and view; no other touches its rows.
+// Moves and splats what lands on a band of `band_rows` rows. A work-item a view and band; no other touches its rows.
+// The views go by turns, as bands of rows that are skipped take less time, and work-items are dealt out by halves.
 COMPILED_ONCE void splat_bands_row(const WorkItem at, const ImageSize size, const DisparityRange range,
                                    const DisparityMotion left, const DisparityMotion right, const float process_noise,
                                    const int band_rows, global const int* spans, global const float* disparity,
                                    global const float* variance, global const uchar* evidence, global float* predicted,
                                    global float* predicted_variance, global uchar* predicted_evidence) {
-  const int view = at.y;
+  const int view = at.x;
   const int width = size.width;
-  const int first = at.x * band_rows;
+  const int first = at.y * band_rows;
   const int end = min(first + band_rows, size.height);
   const DisparityMotion motion = view == EGOSGM_LEFT ? left : right;
   const size_t rows = (size_t)view * size.height;
   global float* band = predicted + (rows + first) * width;
   global float* band_variance = predicted_variance + (rows + first) * width;
   global uchar* band_evidence = predicted_evidence + (rows + first) * width;
-  const int pixels = (end - first) * width;
-  for (int i = 0; i < pixels; i += PIXELS) {
-    store_pixels(INVALID, band, i, pixels);
-    store_pixels(0.0f, band_variance, i, pixels);
-    store_bytes(0, band_evidence, i, pixels);
+  const int begin = (first + motion.row_step - 1) / motion.row_step * motion.row_step;
+  for (int y = begin; y < end; y += motion.row_step) {
+    const size_t row = (size_t)(y - first) * width;
+    for (int x = 0; x < width; x += PIXELS) {
+      store_pixels(INVALID, band + row, x, width);
+      store_pixels(0.0f, band_variance + row, x, width);
+      store_bytes(0, band_evidence + row, x, width);
+    }
   }
   for (int y = 0; y < size.height; ++y) {
     if (spans[2 * (rows + y)] >= end || spans[2 * (rows + y) + 1] < first) continue;
@@ -240,12 +246,15 @@ COMPILED_ONCE void splat_bands_row(const WorkItem at, const ImageSize size, cons
       }
     }
   }
-  for (int i = 0; i < pixels; i += PIXELS) {
-    const Floats d = load_pixels(band, i, pixels);
-    const Ints is_beyond = d > (Floats)(range.min + range.count - 1);
-    if (!any_of(is_beyond)) continue;
-    store_pixels(is_beyond ? INVALID : d, band, i, pixels);
-    store_pixels(is_beyond ? (Floats)(EGOSGM_HIDDEN) : load_pixels(band_variance, i, pixels), band_variance, i, pixels);
+  for (int y = begin; y < end; y += motion.row_step) {
+    global float *row = band + (size_t)(y - first) * width, *row_variance = band_variance + (size_t)(y - first) * width;
+    for (int x = 0; x < width; x += PIXELS) {
+      const Floats d = load_pixels(row, x, width);
+      const Ints is_beyond = d > (Floats)(range.min + range.count - 1);
+      if (!any_of(is_beyond)) continue;
+      store_pixels(is_beyond ? INVALID : d, row, x, width);
+      store_pixels(is_beyond ? (Floats)(EGOSGM_HIDDEN) : load_pixels(row_variance, x, width), row_variance, x, width);
+    }
   }
 }
 

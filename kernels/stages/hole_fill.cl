@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Hole fill (eqs. 7-8): gaps of a pixel between horizontal neighbours that differ by less than gamma, then, on that
-// result, between vertical ones. Between hidden neighbours (EGOSGM_HIDDEN), a pixel is hidden too.
+// result, between vertical ones, the next ones that the view has. Between hidden neighbours (EGOSGM_HIDDEN), a pixel is
+// hidden too.
 #include "pixels.h"
 
 // lint: PIXELS=1
@@ -19,9 +20,10 @@ static inline Ints is_hidden(const Floats p, const Floats before, const Floats a
   return (p == hidden) | ((before == hidden) & (after == hidden));
 }
 
-COMPILED_ONCE void fill_row(const WorkItem at, const ImageSize size, const float gamma, global const float* disparity,
-                            global const float* variance, global float* filled_disparity,
+COMPILED_ONCE void fill_row(const WorkItem at, const ImageSize size, const int right_row_step, const float gamma,
+                            global const float* disparity, global const float* variance, global float* filled_disparity,
                             global float* filled_variance) {
+  if (!has_row(at, right_row_step)) return;
   const int width = size.width;
   const size_t row = ((size_t)at.view * size.height + at.y) * width;
 
@@ -42,22 +44,23 @@ COMPILED_ONCE void fill_row(const WorkItem at, const ImageSize size, const float
   }
 }
 
-KERNEL void fill_rows(const ImageSize size, const float gamma, global const float* disparity,
+KERNEL void fill_rows(const ImageSize size, const int right_row_step, const float gamma, global const float* disparity,
                       global const float* variance, global float* filled_disparity, global float* filled_variance) {
-  fill_row(THIS_WORK_ITEM, size, gamma, disparity, variance, filled_disparity, filled_variance);
+  fill_row(THIS_WORK_ITEM, size, right_row_step, gamma, disparity, variance, filled_disparity, filled_variance);
 }
 
 // `hidden`: 1 where a pixel is.
-COMPILED_ONCE void fill_columns_row(const WorkItem at, const ImageSize size, const float gamma,
-                                    global const float* disparity, global const float* variance,
+COMPILED_ONCE void fill_columns_row(const WorkItem at, const ImageSize size, const int right_row_step,
+                                    const float gamma, global const float* disparity, global const float* variance,
                                     global float* filled_disparity, global float* filled_variance,
                                     global uchar* hidden) {
-  const int y = at.y;
+  if (!has_row(at, right_row_step)) return;
+  const int y = at.y, step = row_step_of(at.view, right_row_step);
   const int width = size.width;
   const size_t row = ((size_t)at.view * size.height + y) * width;
   // At the border the row itself, whose pixels are valid or no neighbours.
-  const size_t row_above = y >= 1 ? row - width : row;
-  const size_t row_below = y + 1 < size.height ? row + width : row;
+  const size_t row_above = y >= step ? row - (size_t)step * width : row;
+  const size_t row_below = y + step < size.height ? row + (size_t)step * width : row;
 
   FOR_PIXELS(x, width) {
     const Floats d = load_pixels(disparity + row, x, width);
@@ -74,8 +77,9 @@ COMPILED_ONCE void fill_columns_row(const WorkItem at, const ImageSize size, con
   }
 }
 
-KERNEL void fill_columns(const ImageSize size, const float gamma, global const float* disparity,
-                         global const float* variance, global float* filled_disparity, global float* filled_variance,
-                         global uchar* hidden) {
-  fill_columns_row(THIS_WORK_ITEM, size, gamma, disparity, variance, filled_disparity, filled_variance, hidden);
+KERNEL void fill_columns(const ImageSize size, const int right_row_step, const float gamma,
+                         global const float* disparity, global const float* variance, global float* filled_disparity,
+                         global float* filled_variance, global uchar* hidden) {
+  fill_columns_row(THIS_WORK_ITEM, size, right_row_step, gamma, disparity, variance, filled_disparity, filled_variance,
+                   hidden);
 }

@@ -115,12 +115,13 @@ static inline Ints lesser_of(const Ints a, const Ints b) { return a < b ? a : b;
 
 // The evidence that moved to pixels of a row of a view. A hole that was filled has that of the lesser of the two beside
 // it, or above and below it.
-static inline Ints moved_evidence(const ImageSize size, const int x, const int y, global const uchar* row) {
+static inline Ints moved_evidence(const ImageSize size, const int step, const int x, const int y,
+                                  global const uchar* row) {
   const Ints own = load_bytes(row, x, size.width);
   const Ints beside = lesser_of(load_bytes(row, x - 1, size.width), load_bytes(row, x + 1, size.width));
-  if (y == 0 || y + 1 >= size.height) return own > 0 ? own : beside;
-  const Ints around =
-      lesser_of(load_bytes(row - size.width, x, size.width), load_bytes(row + size.width, x, size.width));
+  if (y < step || y + step >= size.height) return own > 0 ? own : beside;
+  const int stride = step * size.width;
+  const Ints around = lesser_of(load_bytes(row - stride, x, size.width), load_bytes(row + stride, x, size.width));
   return own > 0 ? own : beside > 0 ? beside : around;
 }
 
@@ -181,6 +182,8 @@ COMPILED_ONCE void update_row(const WorkItem at, const KalmanParameters q, globa
                               global const uchar* evidence_before, global const int* block_evidence,
                               global const float* found, global const float* drifts, global float* updated,
                               global float* updated_variance, global uchar* updated_doubtful, global uchar* evidence) {
+  if (!has_row(at, q.right_row_step)) return;
+  const int step = row_step_of(at.view, q.right_row_step);
   const ImageSize size = {q.width, q.height};
   const int width = q.width;
   const int y = at.y;
@@ -202,7 +205,7 @@ COMPILED_ONCE void update_row(const WorkItem at, const KalmanParameters q, globa
       const Floats r = load_pixels(measured_variance + row, x, width);
       Verdict verdict = {(Ints)(EGOSGM_EVIDENCE_MOST), (Ints)(-1), (Ints)(-1)};
       if (q.has_evidence) {
-        verdict = judged(&q, moved_evidence(size, x, y, evidence_before + row),
+        verdict = judged(&q, moved_evidence(size, step, x, y, evidence_before + row),
                          OF_ITS_BLOCK(Ints, block_evidence + row_of_blocks, x),
                          OF_ITS_BLOCK(Floats, found + row_of_blocks, x), d, z, x, at.view);
       }

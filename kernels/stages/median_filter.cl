@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The median of 3x3 disparities, in both views. A neighbour outside the image or without a value votes for the centre;
 // a centre without a value gets the median (the upper of two middle ones) of its neighbours if at least
-// EGOSGM_FILL_MIN_COUNT of the eight have one.
+// EGOSGM_FILL_MIN_COUNT of the eight have one. Rows above and below are the next ones that the view has.
 #include "method.h"
 #include "pixels.h"
 
@@ -76,29 +76,33 @@ ALWAYS_INLINE void filter_block(const int x, const int width, const bool fills, 
 }
 
 AT_EDGE void filter_block_at_edge(const int x, const bool fills, const int has_above, const int has_below,
-                                  const int width, global const float* here, global float* filtered,
+                                  const int width, const int stride, global const float* here, global float* filtered,
                                   global float* variance) {
-  filter_block(x, width, fills, has_above, has_below, width, here, filtered, variance);
+  filter_block(x, width, fills, has_above, has_below, stride, here, filtered, variance);
 }
 
-COMPILED_ONCE void filter_row(const WorkItem at, const bool fills, const ImageSize size, global const float* disparity,
-                              global float* filtered, global float* variance) {
-  const int width = size.width, has_above = at.y >= 1, has_below = at.y + 1 < size.height;
+COMPILED_ONCE void filter_row(const WorkItem at, const bool fills, const ImageSize size, const int right_row_step,
+                              global const float* disparity, global float* filtered, global float* variance) {
+  if (!has_row(at, right_row_step)) return;
+  const int step = row_step_of(at.view, right_row_step), stride = step * size.width;
+  const int width = size.width, has_above = at.y >= step, has_below = at.y + step < size.height;
   const size_t row = ((size_t)at.view * size.height + at.y) * width;
   FOR_PIXELS(x, width) {
     if (has_above && has_below && is_within(x, 1, width)) {
-      filter_block(x, EVERYWHERE, fills, 1, 1, width, disparity + row, filtered + row, variance + row);
+      filter_block(x, EVERYWHERE, fills, 1, 1, stride, disparity + row, filtered + row, variance + row);
     } else {
-      filter_block_at_edge(x, fills, has_above, has_below, width, disparity + row, filtered + row, variance + row);
+      filter_block_at_edge(x, fills, has_above, has_below, width, stride, disparity + row, filtered + row,
+                           variance + row);
     }
   }
 }
 
-KERNEL void filter(const ImageSize size, global const float* disparity, global float* filtered) {
-  filter_row(THIS_WORK_ITEM, false, size, disparity, filtered, 0);
+KERNEL void filter(const ImageSize size, const int right_row_step, global const float* disparity,
+                   global float* filtered) {
+  filter_row(THIS_WORK_ITEM, false, size, right_row_step, disparity, filtered, 0);
 }
 
-KERNEL void filter_and_fill(const ImageSize size, global const float* disparity, global float* filtered,
-                            global float* variance) {
-  filter_row(THIS_WORK_ITEM, true, size, disparity, filtered, variance);
+KERNEL void filter_and_fill(const ImageSize size, const int right_row_step, global const float* disparity,
+                            global float* filtered, global float* variance) {
+  filter_row(THIS_WORK_ITEM, true, size, right_row_step, disparity, filtered, variance);
 }

@@ -19,18 +19,19 @@
 // So many times BLOCKS at once: less of a row at a time would cost as long a wait for memory.
 #define GATHERED_AT_ONCE (PIXELS == 1 ? 1 : 8)
 
-// A work-item BLOCKS blocks and view, or a row of blocks and view.
-KERNEL void gather_blocks(const ImageSize size, global const float* disparity, global BlockRange* ranges) {
+// Predictions count for the rows that the view lacks, too. A work-item BLOCKS blocks and view, or a row of them.
+KERNEL void gather_blocks(const ImageSize size, const int right_row_step, global const float* disparity,
+                          global BlockRange* ranges) {
   const WorkItem at = THIS_WORK_ITEM;
   const ImageSize blocks = blocks_of(size);
   const int y = at.y;
   const int view = at.view;
-  const int end = min((y + 1) * EGOSGM_BLOCK, size.height);
+  const int end = min((y + 1) * EGOSGM_BLOCK, size.height), step = row_step_of(view, right_row_step);
   for (int x = at.x * BLOCKS * GATHERED_AT_ONCE; x < blocks.width; x += at.items * BLOCKS * GATHERED_AT_ONCE) {
     Spans spans[GATHERED_AT_ONCE];
 #pragma unroll
     for (int i = 0; i < GATHERED_AT_ONCE; ++i) spans[i] = no_spans();
-    for (int row = y * EGOSGM_BLOCK; row < end; ++row) {
+    for (int row = y * EGOSGM_BLOCK; row < end; row += step) {
       global const float* of_row = disparity + ((size_t)view * size.height + row) * size.width;
 #pragma unroll
       for (int i = 0; i < GATHERED_AT_ONCE; ++i) {
@@ -40,6 +41,7 @@ KERNEL void gather_blocks(const ImageSize size, global const float* disparity, g
     global BlockRange* to = ranges + index_of(blocks, view, x, y);
 #pragma unroll
     for (int i = 0; i < GATHERED_AT_ONCE; ++i) {
+      spans[i].count *= step;
 #if BLOCKS == 1
       to[i] = range_of(spans[i].least, spans[i].most, spans[i].count);
 #else
@@ -227,16 +229,15 @@ COMPILED_ONCE void sum_row(const WorkItem at, const ImageSize size, global const
 #endif
 
 // Work-items that have a row alone sum it up, too. A work-item PIXELS pixels and view, or a row and view.
-COMPILED_ONCE void bands_of_pixels_row(const WorkItem at, const ImageSize size, const DisparityRange range,
-                                       const float sigmas, const float min_half_width, global const float* disparity,
-                                       global const float* variance, const float coarse_tolerance,
-                                       const float coarse_margin, global const BlockRange* found,
-                                       global const Band* block_bands, global Band* bands, global uint* cell_offsets,
-                                       global RowSum* row_sums) {
+COMPILED_ONCE void bands_of_pixels_row(const WorkItem at, const ImageSize size, const int right_row_step,
+                                       const DisparityRange range, const float sigmas, const float min_half_width,
+                                       global const float* disparity, global const float* variance,
+                                       const float coarse_tolerance, const float coarse_margin,
+                                       global const BlockRange* found, global const Band* block_bands,
+                                       global Band* bands, global uint* cell_offsets, global RowSum* row_sums) {
   const ImageSize blocks = blocks_of(size);
-  const int y = at.y;
-  const int view = at.view;
-  const int width = size.width;
+  const int y = at.y, view = at.view, width = size.width;
+  if (!has_row(at, right_row_step)) return;
   const size_t row = ((size_t)view * size.height + y) * width;
   const size_t row_of_blocks = index_of(blocks, view, 0, y / EGOSGM_BLOCK);
   FOR_CHUNKS(start, width) {
@@ -266,41 +267,41 @@ COMPILED_ONCE void bands_of_pixels_row(const WorkItem at, const ImageSize size, 
 #endif
 }
 
-KERNEL void bands_of_pixels(const ImageSize size, const DisparityRange range, const float sigmas,
-                            const float min_half_width, global const float* disparity, global const float* variance,
-                            const float coarse_tolerance, const float coarse_margin, global const BlockRange* found,
-                            global const Band* block_bands, global Band* bands, global uint* cell_offsets,
-                            global RowSum* row_sums) {
-  bands_of_pixels_row(THIS_WORK_ITEM, size, range, sigmas, min_half_width, disparity, variance, coarse_tolerance,
-                      coarse_margin, found, block_bands, bands, cell_offsets, row_sums);
+KERNEL void bands_of_pixels(const ImageSize size, const int right_row_step, const DisparityRange range,
+                            const float sigmas, const float min_half_width, global const float* disparity,
+                            global const float* variance, const float coarse_tolerance, const float coarse_margin,
+                            global const BlockRange* found, global const Band* block_bands, global Band* bands,
+                            global uint* cell_offsets, global RowSum* row_sums) {
+  bands_of_pixels_row(THIS_WORK_ITEM, size, right_row_step, range, sigmas, min_half_width, disparity, variance,
+                      coarse_tolerance, coarse_margin, found, block_bands, bands, cell_offsets, row_sums);
 }
 
 #if ROW_GROUP == 1
 
 // Counts rows that were not banded pixel by pixel. A work-item a row and view.
-KERNEL void sum_rows(const ImageSize size, global const float* disparity, global const Band* bands,
-                     global uint* cell_offsets, global RowSum* row_sums) {
-  sum_row(THIS_WORK_ITEM, size, disparity, bands, cell_offsets, row_sums);
+KERNEL void sum_rows(const ImageSize size, const int right_row_step, global const float* disparity,
+                     global const Band* bands, global uint* cell_offsets, global RowSum* row_sums) {
+  const WorkItem at = THIS_WORK_ITEM;
+  if (has_row(at, right_row_step)) sum_row(at, size, disparity, bands, cell_offsets, row_sums);
 }
 
 #else
 
 // Sums up each row: a work-group of ROW_GROUP a row and view goes over it in tiles, with an inclusive scan of a tile at
 // a time.
-KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(const ImageSize size,
-                                                                            global const float* disparity,
-                                                                            global const Band* bands,
-                                                                            global uint* cell_offsets,
-                                                                            global RowSum* row_sums) {
+KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(
+    const ImageSize size, const int right_row_step, global const float* disparity, global const Band* bands,
+    global uint* cell_offsets, global RowSum* row_sums) {
   const int lane = get_local_id(0);
   const int y = get_global_id(1);
   const int view = get_global_id(2);
   const size_t row = (size_t)view * size.height + y;
+  const int width = has_row(THIS_WORK_ITEM, right_row_step) ? size.width : 0;
   uint chunks_before = 0;
   uint predicted = 0;
   local uint chunks[ROW_GROUP];
   local uint totals[ROW_GROUP];
-  for (int tile = 0; tile < size.width; tile += ROW_GROUP) {
+  for (int tile = 0; tile < width; tile += ROW_GROUP) {
     const int x = tile + lane;
     const size_t pixel = row * size.width + x;
     uint own = 0;

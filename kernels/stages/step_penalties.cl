@@ -35,8 +35,9 @@ static inline Ints penalty(const Ints most, const Ints least, const Ints slope, 
   return max(most - slope * max(p - q, q - p), least);
 }
 
-COMPILED_ONCE void penalties_row(const WorkItem at, const ImageSize size, const int most, const int least,
-                                 const int slope, global const uchar* images, global uchar* steps) {
+COMPILED_ONCE void penalties_row(const WorkItem at, const ImageSize size, const int right_row_step, const int most,
+                                 const int least, const int slope, global const uchar* images, global uchar* steps) {
+  if (!has_row(at, right_row_step)) return;
   const int y = at.y;
   const int width = size.width;
   const size_t row = ((size_t)at.view * size.height + y) * width;
@@ -54,7 +55,7 @@ COMPILED_ONCE void penalties_row(const WorkItem at, const ImageSize size, const 
   }
 }
 
-KERNEL void penalties(const ImageSize size, const int most, const int least, const int slope,
+KERNEL void penalties(const ImageSize size, const int right_row_step, const int most, const int least, const int slope,
                       global const uchar* images, global uchar* steps) {
-  penalties_row(THIS_WORK_ITEM, size, most, least, slope, images, steps);
+  penalties_row(THIS_WORK_ITEM, size, right_row_step, most, least, slope, images, steps);
 }

@@ -6,6 +6,7 @@
 #include <cstdlib>
 
 #include "tests/reference/method.h"
+#include "tests/reference/present_rows.h"
 #include "tests/reference/step_penalties.h"
 
 namespace egosgm::reference {
@@ -161,26 +162,6 @@ void read_off(const View& left, const shared::Band* bands, Cells& sums, testing:
   }
 }
 
-/// The rows of the right view between those that were matched.
-void fill_rows(const shared::SgmParameters& q, testing::HostMaps& maps) {
-  const auto fill = [&](int x, int y) {
-    const int above = y - y % q.right_row_step, next = above + q.right_row_step;
-    const auto at = [&](int row) { return static_cast<std::size_t>(q.height + row) * q.width + x; };
-    const std::size_t here = at(y), first = at(above), second = at(next < q.height ? next : above);
-    if (std::abs(maps.disparity[first] - maps.disparity[second]) <= 1) {
-      maps.disparity[here] = (maps.disparity[first] + maps.disparity[second]) / 2;
-      maps.variance[here] = (maps.variance[first] + maps.variance[second]) / 2;
-    } else {
-      const std::size_t surer = maps.variance[second] < maps.variance[first] ? second : first;
-      maps.disparity[here] = maps.disparity[surer];
-      maps.variance[here] = maps.variance[surer];
-    }
-  };
-  for (int y = 0; y < q.height; ++y) {
-    for (int x = 0; x < q.width && y % q.right_row_step != 0; ++x) fill(x, y);
-  }
-}
-
 }  // namespace
 
 testing::HostMaps banded_sgm(shared::ImageSize size, shared::DisparityRange range, const BandedSgmOptions& options,
@@ -222,8 +203,7 @@ testing::HostMaps banded_sgm(shared::ImageSize size, shared::DisparityRange rang
       return maps;
     }
   }
-  fill_rows(q, maps);
-  return maps;
+  return without_absent_rows(size, right_row_step, maps);
 }
 
 }  // namespace egosgm::reference

@@ -2,26 +2,41 @@
 #include "tests/reference/consistency_check.h"
 
 #include <cmath>
+#include <vector>
 
 namespace egosgm::reference {
+namespace {
+
+/// The rows of the other view that see what row y does.
+std::vector<int> rows_across(int y, int height, int right_row_step) {
+  const int above = y / right_row_step * right_row_step, below = above + right_row_step;
+  if (above == y || below >= height) return {above};
+  return {above, below};
+}
+
+}  // namespace
 
 testing::HostMaps consistency_check(shared::ImageSize size, float max_difference_px, bool keep_outside,
-                                    const testing::HostMaps& in) {
+                                    const testing::HostMaps& in, int right_row_step) {
   const std::size_t pixels = static_cast<std::size_t>(size.width) * size.height;
   testing::HostMaps out{std::vector<float>(2 * pixels, EGOSGM_INVALID_DISPARITY), in.variance, in.hidden};
   for (std::size_t i = 0; i < 2 * pixels; ++i) {
     const bool is_left = i < pixels;
-    const std::size_t x = i % size.width, y = i % pixels / size.width;
+    const int x = static_cast<int>(i % size.width), y = static_cast<int>(i % pixels / size.width);
     const float d = in.disparity[i];
-    if (d == EGOSGM_INVALID_DISPARITY) continue;
+    if (d == EGOSGM_INVALID_DISPARITY || (!is_left && y % right_row_step != 0)) continue;
     const float other_x = std::nearbyint(is_left ? static_cast<float>(x) - d : static_cast<float>(x) + d);
-    const bool inside = other_x >= 0 && other_x < static_cast<float>(size.width);
-    if (!inside && !keep_outside) continue;
-    if (inside) {
-      const float other = in.disparity[(is_left ? pixels : 0) + y * size.width + static_cast<std::size_t>(other_x)];
-      if (other == EGOSGM_INVALID_DISPARITY || std::abs(other - d) > max_difference_px) continue;
+    bool keeps = false;
+    if (!(other_x >= 0 && other_x < static_cast<float>(size.width))) {
+      keeps = keep_outside;
+    } else {
+      for (const int row : rows_across(y, size.height, right_row_step)) {
+        const float other = in.disparity[(is_left ? pixels : 0) + static_cast<std::size_t>(row) * size.width +
+                                         static_cast<std::size_t>(other_x)];
+        keeps = keeps || (other != EGOSGM_INVALID_DISPARITY && std::abs(other - d) <= max_difference_px);
+      }
     }
-    out.disparity[i] = d;
+    if (keeps) out.disparity[i] = d;
   }
   return out;
 }

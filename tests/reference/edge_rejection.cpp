@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "tests/reference/present_rows.h"
+
 namespace egosgm::reference {
 namespace {
 
@@ -10,9 +12,7 @@ struct Step {
   int x, y;
 };
 
-}  // namespace
-
-testing::HostMaps edge_rejection(shared::ImageSize size, float max_jump_px, const testing::HostMaps& in) {
+testing::HostMaps reject_edges(shared::ImageSize size, float max_jump_px, const testing::HostMaps& in) {
   testing::HostMaps out = in;
   const std::size_t pixels = static_cast<std::size_t>(size.width) * size.height;
   for (std::size_t i = 0; i < 2 * pixels; ++i) {
@@ -30,6 +30,15 @@ testing::HostMaps edge_rejection(shared::ImageSize size, float max_jump_px, cons
     }
   }
   return out;
+}
+
+}  // namespace
+
+testing::HostMaps edge_rejection(shared::ImageSize size, float max_jump_px, const testing::HostMaps& in,
+                                 int right_row_step) {
+  return of_present_rows(size, right_row_step, in, [&](shared::ImageSize of, const testing::HostMaps& maps) {
+    return reject_edges(of, max_jump_px, maps);
+  });
 }
 
 }  // namespace egosgm::reference

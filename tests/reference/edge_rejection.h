@@ -6,6 +6,7 @@
 
 namespace egosgm::reference {
 
-testing::HostMaps edge_rejection(shared::ImageSize size, float max_jump_px, const testing::HostMaps& in);
+testing::HostMaps edge_rejection(shared::ImageSize size, float max_jump_px, const testing::HostMaps& in,
+                                 int right_row_step = 1);
 
 }  // namespace egosgm::reference

@@ -127,7 +127,8 @@ Verdict judge(shared::ImageSize size, float gate_px, const FrameEvidence& frame,
   };
   int before = moved(x, y);
   if (before == 0) before = std::min(moved(x - 1, y), moved(x + 1, y));
-  if (before == 0) before = std::min(moved(x, y - 1), moved(x, y + 1));
+  const int step = view == EGOSGM_LEFT ? 1 : frame.right_row_step;
+  if (before == 0) before = std::min(moved(x, y - step), moved(x, y + step));
   if (frame.repeats && is_valid(predicted)) return {before, true, false};
 
   const int columns = (size.width + kSide - 1) / kSide, rows = (size.height + kSide - 1) / kSide;

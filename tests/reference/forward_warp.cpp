@@ -23,7 +23,7 @@ float variance_of_motion(const shared::DisparityMotion& m, float u, float v, flo
 void warp_view(shared::ImageSize size, shared::DisparityRange range, const shared::DisparityMotion& m,
                float process_noise_px2, const float* disparity, const float* variance, const std::uint8_t* evidence,
                float* out_disparity, float* out_variance, std::uint8_t* out_evidence, std::uint8_t* hidden) {
-  for (int y = 0; y < size.height; ++y) {
+  for (int y = 0; y < size.height; y += m.row_step) {
     for (int x = 0; x < size.width; ++x) {
       const std::size_t source = static_cast<std::size_t>(y) * size.width + x;
       if (disparity[source] == EGOSGM_INVALID_DISPARITY) continue;
@@ -34,7 +34,8 @@ void warp_view(shared::ImageSize size, shared::DisparityRange range, const share
       const float phi = 1 / w;
       const float u = row_times(m.x, wx, wy, wd) * phi, v = row_times(m.y, wx, wy, wd) * phi, metric = wd * phi;
       const float d = metric - m.doffs + 0.0f;
-      const float target_x = std::nearbyint(u + m.cx), target_y = std::nearbyint(v + m.cy);
+      const float rows = static_cast<float>(m.row_step);
+      const float target_x = std::nearbyint(u + m.cx), target_y = rows * std::nearbyint((v + m.cy) / rows);
       if (!(target_x >= 0 && target_x < static_cast<float>(size.width))) continue;
       if (!(target_y >= 0 && target_y < static_cast<float>(size.height))) continue;
       if (!(d >= static_cast<float>(range.min))) continue;

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tests/reference/present_rows.h"
+
 namespace egosgm::reference {
 namespace {
 
@@ -25,9 +27,7 @@ void fill(const testing::HostMaps& in, std::size_t i, std::size_t step, float ma
   out.hidden[i] = 0;
 }
 
-}  // namespace
-
-testing::HostMaps hole_fill(shared::ImageSize size, float max_difference_px, const testing::HostMaps& in) {
+testing::HostMaps fill_holes(shared::ImageSize size, float max_difference_px, const testing::HostMaps& in) {
   const std::size_t width = size.width, height = size.height;
   testing::HostMaps rows_filled = in;
   for (std::size_t i = 0; i < in.disparity.size(); ++i) {
@@ -40,6 +40,15 @@ testing::HostMaps hole_fill(shared::ImageSize size, float max_difference_px, con
     if (y >= 1 && y + 1 < height) fill(rows_filled, i, width, max_difference_px, out);
   }
   return out;
+}
+
+}  // namespace
+
+testing::HostMaps hole_fill(shared::ImageSize size, float max_difference_px, const testing::HostMaps& in,
+                            int right_row_step) {
+  return of_present_rows(size, right_row_step, in, [&](shared::ImageSize of, const testing::HostMaps& maps) {
+    return fill_holes(of, max_difference_px, maps);
+  });
 }
 
 }  // namespace egosgm::reference

@@ -6,6 +6,7 @@
 
 namespace egosgm::reference {
 
-testing::HostMaps hole_fill(shared::ImageSize size, float max_difference_px, const testing::HostMaps& in);
+testing::HostMaps hole_fill(shared::ImageSize size, float max_difference_px, const testing::HostMaps& in,
+                            int right_row_step = 1);
 
 }  // namespace egosgm::reference

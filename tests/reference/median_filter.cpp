@@ -4,10 +4,13 @@
 #include <algorithm>
 
 #include "tests/reference/method.h"
+#include "tests/reference/present_rows.h"
 
 namespace egosgm::reference {
 
-testing::HostMaps median_filter(shared::ImageSize size, bool fill, const testing::HostMaps& in) {
+namespace {
+
+testing::HostMaps filter(shared::ImageSize size, bool fill, const testing::HostMaps& in) {
   testing::HostMaps out = in;
   const std::size_t pixels = static_cast<std::size_t>(size.width) * size.height;
   for (std::size_t view = 0; view < 2; ++view) {
@@ -32,6 +35,13 @@ testing::HostMaps median_filter(shared::ImageSize size, bool fill, const testing
     }
   }
   return out;
+}
+
+}  // namespace
+
+testing::HostMaps median_filter(shared::ImageSize size, bool fill, const testing::HostMaps& in, int right_row_step) {
+  return of_present_rows(size, right_row_step, in,
+                         [&](shared::ImageSize of, const testing::HostMaps& maps) { return filter(of, fill, maps); });
 }
 
 }  // namespace egosgm::reference

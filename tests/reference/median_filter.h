@@ -6,6 +6,6 @@
 
 namespace egosgm::reference {
 
-testing::HostMaps median_filter(shared::ImageSize size, bool fill, const testing::HostMaps& in);
+testing::HostMaps median_filter(shared::ImageSize size, bool fill, const testing::HostMaps& in, int right_row_step = 1);
 
 }  // namespace egosgm::reference

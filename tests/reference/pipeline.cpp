@@ -19,8 +19,10 @@
 #include "tests/reference/median_filter.h"
 #include "tests/reference/method.h"
 #include "tests/reference/output_variance.h"
+#include "tests/reference/present_rows.h"
 #include "tests/reference/reasons.h"
 #include "tests/reference/right_map.h"
+#include "tests/reference/row_interpolation.h"
 #include "tests/reference/sad_check.h"
 #include "tests/reference/speckle_removal.h"
 #include "tests/reference/step_penalties.h"
@@ -66,6 +68,8 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
   Frame frame;
   frame.unpredicted = !options_.temporal ? "not temporal" : !belief_ ? no_belief_reason_ : !motions ? "no motion" : "";
   const bool has_prediction = frame.unpredicted.empty();
+  frame.tracked_views = options_.track_right ? 2 : 1;
+  frame.right_row_step = has_prediction ? right_row_step() : 1;
   if (has_prediction) predict(*motions, frame);
 
   const int passes = options_.vertical_alignment.enabled && !has_offset_ ? 2 : 1;
@@ -81,10 +85,12 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
                                   : std::vector<std::uint8_t>(frame.result.disparity.size(),
                                                               static_cast<std::uint8_t>(kTrustedEvidence));
   frame.output = frame.result.disparity;
+  const int step = frame.right_row_step;
   if (has_prediction && has_evidence()) {
     testing::HostMaps belief = frame.result;
     belief.evidence = frame.evidence;
     frame.output = confirmed(size_, belief, !options_.track_right);
+    frame.output = row_interpolation(size_, step, {frame.output, frame.result.variance}).disparity;
   }
   frame.dynamic.assign(static_cast<std::size_t>(size_.width) * size_.height, 0);
   if (has_prediction) {
@@ -92,7 +98,8 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
                                 motions->left_back);
   }
   frame.output_variance =
-      output_variance(size_, options_.output_variance, frame.output, frame.result, frame.passes.back().measured);
+      output_variance(size_, options_.output_variance, frame.output, row_interpolation(size_, step, frame.result),
+                      row_interpolation(size_, step, frame.passes.back().measured));
   frame.reasons = explain(images, frame);
   if (!options_.temporal) return frame;
   offset_ = frame.passes.back().offset;
@@ -102,6 +109,11 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
   greys_ = images.greys;
   bits_ = images.bits;
   return frame;
+}
+
+int Pipeline::right_row_step() const {
+  const bool skips = options_.search == SearchMode::kBand && options_.track_right && has_evidence();
+  return skips ? options_.banded_sgm.right_row_step : 1;
 }
 
 bool Pipeline::has_evidence() const {
@@ -128,16 +140,18 @@ std::vector<std::uint8_t> Pipeline::explain(const Images& images, const Frame& f
 }
 
 void Pipeline::predict(const ViewMotions& motions, Frame& frame) const {
-  frame.warped =
-      forward_warp(size_, range_, motions.left, motions.right, options_.forward_warp.process_noise_px2, *belief_);
+  const int step = right_row_step();
+  shared::DisparityMotion right = motions.right;
+  right.row_step = step;
+  frame.warped = forward_warp(size_, range_, motions.left, right, options_.forward_warp.process_noise_px2, *belief_);
   const float max_jump_px = options_.edge_rejection.max_jump_px;
   const ConsistencyCheckOptions& check = options_.consistency;
-  if (max_jump_px > 0) frame.without_edges = edge_rejection(size_, max_jump_px, frame.warped);
-  frame.predicted =
-      hole_fill(size_, options_.hole_fill.max_difference_px, max_jump_px > 0 ? frame.without_edges : frame.warped);
+  if (max_jump_px > 0) frame.without_edges = edge_rejection(size_, max_jump_px, frame.warped, step);
+  frame.predicted = hole_fill(size_, options_.hole_fill.max_difference_px,
+                              max_jump_px > 0 ? frame.without_edges : frame.warped, step);
   if (!options_.track_right || !check.checks_prediction) return;
   frame.filled = frame.predicted;
-  frame.predicted = consistency_check(size_, check.update_px, check.keep_unseen, frame.filled);
+  frame.predicted = consistency_check(size_, check.update_px, check.keep_unseen, frame.filled, step);
 }
 
 namespace {
@@ -159,6 +173,7 @@ Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOff
   const BandedSgmOptions& sgm = options_.banded_sgm;
   const bool everything = frame.predicted.disparity.empty() || options_.search == SearchMode::kFull;
   const bool reads_off = !frame.predicted.disparity.empty() && !options_.track_right;
+  const int step = everything ? 1 : right_row_step();
   Pass pass;
   pass.images = resample(size_, known, images.greys);
   if (!everything && options_.coarse_match.enabled) {
@@ -166,7 +181,7 @@ Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOff
     std::tie(pass.coarse_codes, pass.coarse_alike) = coarse_codes(size_, pass.images, images.bits);
   }
   pass.band = everything ? full_range(size_, range_, frame.predicted.disparity)
-                         : search_band(size_, range_, options_.search_band, frame.predicted, pass.coarse);
+                         : search_band(size_, range_, options_.search_band, frame.predicted, pass.coarse, step);
 
   const auto middle = pass.images.begin() + static_cast<std::ptrdiff_t>(pass.images.size() / 2);
   const std::vector<std::uint64_t> both[2] = {codes(size_, {pass.images.begin(), middle}, images.bits, sgm.cost),
@@ -177,12 +192,11 @@ Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOff
   pass.penalties = step_penalties(size_, values, images.bits, sgm);
   std::vector<std::uint16_t> grey = values;
   for (std::uint16_t& value : grey) value = static_cast<std::uint16_t>(value >> (images.bits - 8));
-  const int right_row_step = everything || reads_off ? 1 : sgm.right_row_step;
-  pass.matched = banded_sgm(size_, range_, sgm, both, grey, pass.band.bands, reads_off, right_row_step);
-  pass.smoothed = options_.median_filter.enabled ? median_filter(size_, false, pass.matched) : pass.matched;
+  pass.matched = banded_sgm(size_, range_, sgm, both, grey, pass.band.bands, reads_off, step);
+  pass.smoothed = options_.median_filter.enabled ? median_filter(size_, false, pass.matched, step) : pass.matched;
   const ConsistencyCheckOptions& check = options_.consistency;
   pass.consistent =
-      consistency_check(size_, reads_off ? check.read_off_px : check.measurement_px, false, pass.smoothed);
+      consistency_check(size_, reads_off ? check.read_off_px : check.measurement_px, false, pass.smoothed, step);
   const bool judges_by_evidence = !frame.predicted.disparity.empty() && has_evidence();
   pass.measured =
       judges_by_evidence ? pass.consistent : speckle_removal(size_, options_.speckle_removal, pass.consistent);
@@ -208,18 +222,20 @@ void Pipeline::update(const Images& images, bool stands, Frame& frame) const {
     evidence = FrameEvidence{
         frame.warped.evidence,
         block_evidence(options_.kalman_update.gate_px, pass.view_codes, coarse, frame.predicted, pass.measured),
-        images.greys == greys_, stands && coarse.has_value()};
+        images.greys == greys_, stands && coarse.has_value(), right_row_step()};
     frame.block_evidence = evidence->blocks.evidence;
   }
+  const int step = right_row_step();
   frame.fused =
       kalman_update(size_, options_.kalman_update, frame.predicted, pass.measured, evidence ? &*evidence : nullptr);
-  frame.fused_smoothed = options_.median_filter.enabled ? median_filter(size_, true, frame.fused) : frame.fused;
+  frame.fused = without_absent_rows(size_, step, frame.fused);
+  frame.fused_smoothed = options_.median_filter.enabled ? median_filter(size_, true, frame.fused, step) : frame.fused;
   if (!options_.track_right) {
     frame.fused_smoothed =
         right_map(size_, range_.min, options_.consistency.update_px, pass.measured, frame.fused_smoothed);
   }
-  frame.fused_consistent =
-      consistency_check(size_, options_.consistency.update_px, options_.consistency.keep_unseen, frame.fused_smoothed);
+  frame.fused_consistent = consistency_check(size_, options_.consistency.update_px, options_.consistency.keep_unseen,
+                                             frame.fused_smoothed, step);
   frame.updated = options_.sad_check.max_difference > 0 ? sad_check(size_, options_.sad_check, pass.images,
                                                                     images.bits == 8 ? 1 : 257, frame.fused_consistent)
                                                         : frame.fused_consistent;

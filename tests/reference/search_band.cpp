@@ -59,31 +59,39 @@ std::pair<float, float> found_around(shared::ImageSize size, const std::vector<f
   return {found[kCoarseOutliers], found[found.size() - 1 - kCoarseOutliers]};
 }
 
+/// Disparities of both views; of the right one, every so many-th row is there.
+struct PresentMap {
+  shared::ImageSize size;
+  const std::vector<float>& disparity;
+  int right_row_step;
+};
+
 /// What is predicted in the blocks from (first_x, first_y) to (last_x, last_y).
 struct Predicted {
   float least = kInfinity, most = -kInfinity;
   int count = 0;
 };
-Predicted predicted_in(shared::ImageSize size, const std::vector<float>& disparity, int view, int first_x, int first_y,
-                       int last_x, int last_y) {
+Predicted predicted_in(const PresentMap& map, int view, int first_x, int first_y, int last_x, int last_y) {
+  const shared::ImageSize size = map.size;
+  const int step = view == EGOSGM_LEFT ? 1 : map.right_row_step;
   Predicted found;
-  for (int y = std::max(0, first_y * EGOSGM_BLOCK); y < std::min(size.height, (last_y + 1) * EGOSGM_BLOCK); ++y) {
+  for (int y = std::max(0, first_y * EGOSGM_BLOCK); y < std::min(size.height, (last_y + 1) * EGOSGM_BLOCK); y += step) {
     for (int x = std::max(0, first_x * EGOSGM_BLOCK); x < std::min(size.width, (last_x + 1) * EGOSGM_BLOCK); ++x) {
-      const float d = disparity[(static_cast<std::size_t>(view) * size.height + y) * size.width + x];
+      const float d = map.disparity[(static_cast<std::size_t>(view) * size.height + y) * size.width + x];
       if (!is_valid(d)) continue;
-      found.least = std::min(found.least, d), found.most = std::max(found.most, d), ++found.count;
+      found.least = std::min(found.least, d), found.most = std::max(found.most, d), found.count += step;
     }
   }
   return found;
 }
 
 /// What is predicted in a block and in those above and below it, and the thin things farther above and below it.
-Predicted predicted_upright(shared::ImageSize size, const std::vector<float>& disparity, int view, int x, int y) {
-  const int last = (size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK - 1;
-  Predicted found = predicted_in(size, disparity, view, x, y - 1, x, y + 1);
+Predicted predicted_upright(const PresentMap& map, int view, int x, int y) {
+  const int last = (map.size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK - 1;
+  Predicted found = predicted_in(map, view, x, y - 1, x, y + 1);
   for (int v = y - kThinReach; v <= y + kThinReach; v += 2) {
     const auto in = [&](int u) {
-      return predicted_in(size, disparity, view, std::clamp(u, 0, last), v, std::clamp(u, 0, last), v);
+      return predicted_in(map, view, std::clamp(u, 0, last), v, std::clamp(u, 0, last), v);
     };
     const Predicted own = in(x);
     if (own.count == 0 || !(own.most > std::max(in(x - kThinBlocks).most, in(x + kThinBlocks).most) + kThinJumpPx)) {
@@ -94,10 +102,9 @@ Predicted predicted_upright(shared::ImageSize size, const std::vector<float>& di
   return found;
 }
 
-shared::Band from_neighbours(shared::ImageSize size, shared::DisparityRange range, const SearchBandOptions& options,
-                             const std::vector<float>& predicted, std::pair<float, float> coarse, int view, int x,
-                             int y) {
-  const Predicted around = predicted_in(size, predicted, view, x - 1, y - 1, x + 1, y + 1);
+shared::Band from_neighbours(const PresentMap& predicted, shared::DisparityRange range,
+                             const SearchBandOptions& options, std::pair<float, float> coarse, int view, int x, int y) {
+  const Predicted around = predicted_in(predicted, view, x - 1, y - 1, x + 1, y + 1);
   if (around.count == 0 || around.count < options.neighbour_min_count) return band_of(range, -kInfinity, kInfinity);
   const float from = around.least - options.neighbour_margin_px, to = around.most + options.neighbour_margin_px;
   if (coarse.first > coarse.second) return band_of(range, from, to);
@@ -137,20 +144,20 @@ void sum_rows(shared::ImageSize size, const std::vector<float>& disparity, Searc
 }  // namespace
 
 SearchBands search_band(shared::ImageSize size, shared::DisparityRange range, const SearchBandOptions& options,
-                        const testing::HostMaps& predicted, const std::vector<float>& coarse) {
+                        const testing::HostMaps& predicted, const std::vector<float>& coarse, int right_row_step) {
   const int blocks_x = (size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
   const int blocks_y = (size.height + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
   std::vector<shared::Band> of_blocks;
   std::vector<std::pair<float, float>> found;
-  const std::vector<float>& disparity = predicted.disparity;
+  const PresentMap disparities{size, predicted.disparity, right_row_step};
   for (int view = 0; view < 2; ++view) {
     for (int y = 0; y < blocks_y; ++y) {
       for (int x = 0; x < blocks_x; ++x) {
         const std::pair<float, float> of_coarse = found_around(size, coarse, view, x, y);
         of_blocks.push_back(options.from_neighbours
-                                ? from_neighbours(size, range, options, disparity, of_coarse, view, x, y)
+                                ? from_neighbours(disparities, range, options, of_coarse, view, x, y)
                                 : band_of(range, -kInfinity, kInfinity));
-        const Predicted own = options.from_neighbours ? predicted_upright(size, disparity, view, x, y) : Predicted{};
+        const Predicted own = options.from_neighbours ? predicted_upright(disparities, view, x, y) : Predicted{};
         found.push_back({std::min(of_coarse.first, own.least), std::max(of_coarse.second, own.most)});
       }
     }

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "tests/reference/consistency_check.h"
+#include "tests/reference/present_rows.h"
 #include "tests/support/stage_case.h"
 
 namespace egosgm {
@@ -39,13 +40,21 @@ TEST_P(ConsistencyCheckTest, EqualsReference) {
   const testing::HostMaps maps = testing::random_maps(size, -4, 12, 0.2, 5);
   for (const OutsideView outside : {OutsideView::kDrop, OutsideView::kKeep}) {
     for (const float max_difference_px : {0.5f, 3.0f, 40.0f}) {
-      const testing::HostMaps expected =
-          reference::consistency_check(size, max_difference_px, outside == OutsideView::kKeep, maps);
+      const auto expected = [&](int right_row_step) {
+        return reference::consistency_check(size, max_difference_px, outside == OutsideView::kKeep, maps,
+                                            right_row_step)
+            .disparity;
+      };
       for (const int pixels : {1, 16}) {
+        SCOPED_TRACE(std::to_string(max_difference_px) + " px, by " + std::to_string(pixels));
         const std::vector<float> of_left = check(size, max_difference_px, maps, outside, pixels, Views::kLeft);
-        EXPECT_TRUE(testing::same_bits(of_left, testing::left_and_right(expected.disparity, of_left), size));
-        EXPECT_TRUE(testing::same_bits(check(size, max_difference_px, maps, outside, pixels), expected.disparity, size))
-            << max_difference_px << " px, by " << pixels;
+        EXPECT_TRUE(testing::same_bits(of_left, testing::left_and_right(expected(1), of_left), size));
+        for (const int step : {1, 2}) {
+          const std::vector<float> checked = check(size, max_difference_px, maps, outside, pixels, {2, step});
+          EXPECT_TRUE(
+              testing::same_bits(reference::without_absent_rows(size, step, checked, kNone), expected(step), size))
+              << "row step " << step;
+        }
       }
     }
   }

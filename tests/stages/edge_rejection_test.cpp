@@ -2,6 +2,7 @@
 #include "host/stages/edge_rejection.h"
 
 #include "tests/reference/edge_rejection.h"
+#include "tests/reference/present_rows.h"
 #include "tests/support/stage_case.h"
 
 namespace egosgm {
@@ -9,11 +10,12 @@ namespace {
 
 using testing::kNone;
 
-std::vector<float> reject(shared::ImageSize size, float max_jump_px, const testing::HostMaps& maps, int pixels = 0) {
+std::vector<float> reject(shared::ImageSize size, float max_jump_px, const testing::HostMaps& maps, int pixels = 0,
+                          Views views = Views::kBoth) {
   ocl::Context context(testing::any_device());
   EdgeRejection stage(context, size, {.max_jump_px = max_jump_px}, pixels);
   Map kept = testing::upload(context, size, testing::earlier_maps(size)).disparity;
-  stage.reject(testing::upload(context, size, maps).disparity, kept, Views::kBoth);
+  stage.reject(testing::upload(context, size, maps).disparity, kept, views);
   return kept.read(context);
 }
 
@@ -32,10 +34,11 @@ TEST_P(EdgeRejectionTest, EqualsReference) {
   const shared::ImageSize size = GetParam();
   for (const float max_jump_px : {1.0f, 5.0f}) {
     const testing::HostMaps maps = testing::random_maps(size, -20, 100, 0.2, 3);
-    const testing::HostMaps expected = reference::edge_rejection(size, max_jump_px, maps);
-    for (const int pixels : {1, 16}) {
-      EXPECT_TRUE(testing::same_bits(reject(size, max_jump_px, maps, pixels), expected.disparity, size))
-          << max_jump_px << " px, by " << pixels;
+    for (const auto& [step, pixels] : {std::pair{1, 1}, {1, 16}, {2, 1}, {2, 16}}) {
+      const testing::HostMaps expected = reference::edge_rejection(size, max_jump_px, maps, step);
+      const std::vector<float> kept = reject(size, max_jump_px, maps, pixels, {2, step});
+      EXPECT_TRUE(testing::same_bits(reference::without_absent_rows(size, step, kept, kNone), expected.disparity, size))
+          << max_jump_px << " px, by " << pixels << ", row step " << step;
     }
   }
 }

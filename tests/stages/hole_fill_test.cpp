@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "tests/reference/hole_fill.h"
+#include "tests/reference/present_rows.h"
 #include "tests/support/stage_case.h"
 
 namespace egosgm {
@@ -55,10 +56,11 @@ TEST_P(HoleFillTest, EqualsReference) {
       if (maps.disparity[i] != kNone) maps.variance[i] = static_cast<float>(7 + i % 5);
       maps.hidden.push_back(maps.disparity[i] == kNone && i % 3 > 0);
     }
-    const testing::HostMaps expected = reference::hole_fill(size, max_difference_px, maps);
-    for (const int pixels : {1, 16}) {
-      const testing::HostMaps actual = fill(size, max_difference_px, maps, pixels);
-      EXPECT_TRUE(testing::same_maps(actual, expected, size)) << max_difference_px << " px, by " << pixels;
+    for (const auto& [step, pixels] : {std::pair{1, 1}, {1, 16}, {2, 1}, {2, 16}}) {
+      const testing::HostMaps expected = reference::hole_fill(size, max_difference_px, maps, step);
+      const testing::HostMaps actual = fill(size, max_difference_px, maps, pixels, {2, step});
+      EXPECT_TRUE(testing::same_maps(reference::without_absent_rows(size, step, actual), expected, size))
+          << max_difference_px << " px, by " << pixels << ", row step " << step;
     }
   }
 }

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "tests/reference/kalman_update.h"
+#include "tests/reference/present_rows.h"
 #include "tests/support/stage_case.h"
 
 namespace egosgm {
@@ -110,11 +111,17 @@ TEST_P(KalmanUpdateTest, EqualsReferenceWithEvidence) {
   const testing::HostMaps predicted = testing::random_maps(size, -4, 4, 0.3, 16);
   testing::HostMaps measured = testing::random_maps(size, -5, 5, 0.2, 17);
   for (const auto& [repeats, sees_again] : {std::pair{false, false}, {true, false}, {false, true}}) {
-    const reference::FrameEvidence evidence = random_evidence(size, 18, repeats, sees_again);
-    const testing::HostMaps expected = reference::kalman_update(size, {}, predicted, measured, &evidence);
-    for (const int pixels : {1, 16}) {
-      const testing::HostMaps actual = update(size, {}, predicted, measured, pixels, Views::kBoth, &evidence);
-      EXPECT_TRUE(testing::same_maps(actual, expected, size)) << repeats << sees_again << ", by " << pixels;
+    reference::FrameEvidence evidence = random_evidence(size, 18, repeats, sees_again);
+    for (const auto& [step, pixels] : {std::pair{1, 1}, {1, 16}, {2, 1}, {2, 16}}) {
+      const auto present = [&](const testing::HostMaps& maps) {
+        return reference::without_absent_rows(size, step, maps);
+      };
+      evidence.right_row_step = step;
+      const testing::HostMaps expected =
+          present(reference::kalman_update(size, {}, present(predicted), present(measured), &evidence));
+      const testing::HostMaps actual = present(update(size, {}, predicted, measured, pixels, {2, step}, &evidence));
+      EXPECT_TRUE(testing::same_maps(actual, expected, size))
+          << repeats << sees_again << ", by " << pixels << ", row step " << step;
     }
   }
 }

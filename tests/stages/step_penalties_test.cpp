@@ -5,6 +5,7 @@
 
 #include <random>
 
+#include "tests/reference/present_rows.h"
 #include "tests/reference/step_penalties.h"
 #include "tests/support/stage_case.h"
 
@@ -39,11 +40,14 @@ TEST_P(StepPenaltiesTest, EqualsReference) {
   for (const PixelType type : {PixelType::kU8, PixelType::kU16}) {
     const int bits = type == PixelType::kU8 ? 8 : 16;
     const std::vector<std::uint16_t> grey = random_grey(size, bits);
-    for (const int pixels : {1, 16}) {
-      EXPECT_TRUE(testing::same_bits(penalties(size, grey, type, kOptions, pixels),
-                                     reference::step_penalties(size, grey, bits, kOptions),
-                                     {4 * size.width, size.height}))
-          << "by " << pixels;
+    const shared::ImageSize of_steps{4 * size.width, size.height};
+    for (const auto& [step, pixels] : {std::pair{1, 1}, {1, 16}, {2, 1}, {2, 16}}) {
+      const auto present = [&, row_step = step](const std::vector<std::uint8_t>& steps) {
+        return reference::without_absent_rows(of_steps, row_step, steps, std::uint8_t{0});
+      };
+      EXPECT_TRUE(testing::same_bits(present(penalties(size, grey, type, kOptions, pixels, {2, step})),
+                                     present(reference::step_penalties(size, grey, bits, kOptions)), of_steps))
+          << "by " << pixels << ", row step " << step;
     }
   }
 }
