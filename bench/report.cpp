@@ -58,7 +58,10 @@ Json json_of(const Row& row) {
             {"height", row.size.height},
             {"disparities", row.disparities},
             {"median_ms", row.median_ms}};
-  for (const auto& [counter, value] : row.more) json[counter] = value;
+  for (const auto& [counter, value] : row.more) {
+    const auto whole = static_cast<std::int64_t>(value);
+    static_cast<double>(whole) == value ? json[counter] = whole : json[counter] = value;
+  }
   return json;
 }
 
