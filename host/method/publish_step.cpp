@@ -38,8 +38,8 @@ void PublishStep::prepare(PixelType type, const Wanted& wanted) {
 void PublishStep::complete_right(const Plan& plan, StereoMaps& belief, StereoMaps& measured, Map& result) {
   const int step = plan.tracked.right_row_step;
   if (step == 1 || !plan.wanted.has_right()) return;
-  // The belief comes last, as its variance is that of both.
-  if (result.get()() != belief.disparity.get()()) row_interpolation_.interpolate(step, result, belief.variance);
+  row_interpolation_.interpolate(step, result, belief.variance);
+  if (!plan.wanted.has(Output::kRightVariance)) return;
   row_interpolation_.interpolate(step, belief.disparity, belief.variance);
   row_interpolation_.interpolate(step, measured.disparity, measured.variance);
 }

@@ -41,7 +41,7 @@ class PublishStep {
   void prepare(PixelType type, const Wanted& wanted);
 
   /// Fills the rows that the right view lacks, in the maps that its wanted outputs are made of. `result`: the
-  /// disparities that are published; they may be the belief's.
+  /// disparities that are published.
   void complete_right(const Plan& plan, StereoMaps& belief, StereoMaps& measured, Map& result);
   /// Writes what the plan wants. `before`: the belief of the frame before. `after`: this frame's; it keeps the left
   /// image for the next frame's `dynamic` where this frame's is wanted. `variance`: [px^2] of what is published.
