@@ -35,16 +35,14 @@ void FuseStep::update(const Plan& plan, const Matched& matched, const Prediction
   if (median_filter_) median_filter_->fill(fusion.fused, fusion.smoothed, belief.variance, plan.tracked);
   StereoMaps smoothed{median_filter_ ? fusion.smoothed : fusion.fused, belief.variance};
   if (plan.tracked == Views::kLeft) right_map_->complete(measured, left_right_px_, smoothed, plan.wanted.has_right());
-  const bool adds_right = plan.tracked == Views::kLeft && plan.wanted.has_right();
-  const Views checked = adds_right ? Views::kBoth : plan.tracked;
+  const Views checked = plan.wanted.has_right() ? plan.with_right() : plan.tracked;
   consistency_.check(smoothed.disparity, left_right_px_, outside_, belief.disparity, checked);
   if (sad_check_) (*sad_check_)[matched.images.type].check(matched.images.pixels, belief.disparity, checked);
 }
 
 void FuseStep::publish(const Plan& plan, const Belief& belief, Map& confirmed) {
-  const Views right_too = plan.tracked == Views::kLeft ? Views::kBoth : plan.tracked;
   evidence_->publish(belief.maps.disparity, belief.evidence, confirmed,
-                     plan.wanted.has_right() ? right_too : Views::kLeft, plan.tracked);
+                     plan.wanted.has_right() ? plan.with_right() : Views::kLeft, plan.tracked);
 }
 
 }  // namespace egosgm

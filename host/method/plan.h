@@ -28,6 +28,8 @@ struct Plan {
   Wanted wanted;
 
   bool predicts() const { return !why_not; }
+  /// The views that are tracked, or both where the right one is made of the left one.
+  Views with_right() const { return tracked == Views::kLeft ? Views::kBoth : tracked; }
 };
 
 /// `why_no_belief`: why the belief has no maps, if it has none. `knows_offset`: whether it has a vertical offset.
