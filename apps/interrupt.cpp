@@ -10,17 +10,31 @@ namespace {
 std::atomic<bool> flag{false};
 static_assert(std::atomic<bool>::is_always_lock_free);  // or a handler may not touch it
 
+struct Caught {
+  int signal;
+  struct sigaction before = {};
+};
+Caught signals[] = {{SIGINT}, {SIGTERM}, {SIGHUP}};
+bool are_caught = false;
+
 }  // namespace
 
 void catch_interrupts() {
   struct sigaction action = {};
   action.sa_handler = [](int) { flag = true; };
   action.sa_flags = static_cast<int>(SA_RESETHAND | SA_RESTART);
-  sigaction(SIGINT, &action, nullptr);
-  sigaction(SIGTERM, &action, nullptr);
-  struct sigaction hangup = {};
-  sigaction(SIGHUP, nullptr, &hangup);
-  if (hangup.sa_handler != SIG_IGN) sigaction(SIGHUP, &action, nullptr);  // nohup ignores it
+  for (Caught& caught : signals) {
+    sigaction(caught.signal, nullptr, &caught.before);
+    if (caught.before.sa_handler != SIG_IGN) sigaction(caught.signal, &action, nullptr);
+  }
+  are_caught = true;
+}
+
+void release_interrupts() {
+  for (const Caught& caught : signals) {
+    if (are_caught) sigaction(caught.signal, &caught.before, nullptr);
+  }
+  flag = are_caught = false;
 }
 
 bool interrupted() { return flag; }

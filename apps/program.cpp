@@ -11,6 +11,7 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <memory>
 #include <new>
 #include <optional>
 #include <set>
@@ -158,6 +159,7 @@ int failed_or_interrupted(int code, const std::string& what) {
 int run_program(int argc, const char* const* argv, const Package* package) {
   std::signal(SIGXFSZ, SIG_IGN);  // a file beyond `ulimit -f` is to be an error of its write, as a full disk is
   open_standard_streams();
+  const std::shared_ptr<void> at_end(nullptr, [](void*) { release_interrupts(); });
   try {
     return parse_and_run(argc, argv, package);
   } catch (const InvalidArgument& error) {

@@ -246,6 +246,21 @@ def test_a_run_shows_its_frames_and_writes_what_it_writes_alone(street_folder, t
     assert run_tool([*words, "--show", "--write", "variance"]) == 2 and "--show: --write" in capfd.readouterr().err
 
 
+def test_an_interrupt_ends_one_run_of_a_process_and_none_that_ignores_it(street_folder, monkeypatch):
+    seen, words = [], ["run", str(street_folder), "--set", "disparities=48", "--set", "paths=4", "--show"]
+    before = signal.getsignal(signal.SIGINT)
+    try:
+        for handler, code in ((lambda *_: seen.append(code), 130), (signal.SIG_IGN, 0), (lambda *_: seen.append(code), 130)):
+            signal.signal(signal.SIGINT, handler)
+            stops = iter([signal.SIGINT])  # a second one would end the process
+            monkeypatch.setattr(live.Page, "show", lambda *_: [os.kill(os.getpid(), stop) for stop in stops])
+            assert run_tool(words) == code and not seen
+        os.kill(os.getpid(), signal.SIGINT)
+        assert seen == [130]
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
 def test_a_page_makes_no_other_maps_than_the_disparity(street_folder, monkeypatch):
     from egosgm.bag import program as bag_program
     taken = []
