@@ -190,6 +190,9 @@ class StereoVideo:
             return
         first: Tuple[int, ...] = ()
         for number, pair in enumerate(self._source):  # type: ignore[arg-type]
+            if isinstance(pair, (tuple, list)) and any(isinstance(image, (str, os.PathLike)) for image in pair):
+                raise _egosgm.InvalidArgument(f"pair {number}: holds names in place of images: one pair of files, or a pattern for each camera, is the source, "
+                                              'run(("left/*.png", "right/*.png")); of lists of names, read the images')
             if not isinstance(pair, (tuple, list)) or len(pair) != 2:
                 of = f" of {len(pair)}" if isinstance(pair, (tuple, list)) else ""
                 raise _egosgm.InvalidArgument(f"pair {number}: is a {type(pair).__name__}{of}: give pairs (left, right), each an image; one alone is [(left, right)]")

@@ -240,7 +240,8 @@ def test_what_is_no_pair_and_no_calibration_is_said(street, frames):
             egosgm.run(**{"source": [], **wrong})
     for source, named in (([frames[0].left], "pair 0: is a ndarray"), ([(frames[0].left, frames[0].right), (frames[0].left,)], "pair 1: is a tuple of 1"),
                           ([(frames[0].left, None)], "pair 0: holds None"), ([(frames[0].left, frames[0].right, 0.1)], "pair 0: is a tuple of 3"),
-                          ([(frames[0].left, "right.png")], "right is no array")):
+                          ([(frames[0].left, "right.png")], "pair 0: holds names"), ((["a.png"], ["b.png"]), "pair 0: holds names in place of images: one pair"),
+                          ((["a.png", "b.png"], ["c.png", "d.png"]), "pair 0: holds names")):
         with pytest.raises(egosgm.InvalidArgument, match=named):
             list(egosgm.run(source, street.calibration, **OPTIONS))
 
