@@ -92,7 +92,7 @@ class Doubts(Brought):
     def test_a_principal_point_and_a_focal_length_of_other_images(self):
         f, cx, cy, _ = self.calibration()
         for changes, named in ((dict(cx=cx / 4, cy=cy / 4), "principal point"), (dict(fx=f / 40, fy=f / 40), "focal lengths"),
-                               (dict(doffs_px=cx), "the right principal point"), (dict(cx=HEIGHT / 2, cy=WIDTH / 2), "are turned by 90 degrees")):
+                               (dict(doffs_px=cx), "the right principal point"), (dict(cx=HEIGHT / 2, cy=WIDTH / 2), "are turned by 90 degrees, or cx and cy are exchanged")):
             arguments = self.with_calibration(self.calibrated(**changes))
             self.assertIn(named, self.assert_works("run", *arguments, "--out", self.new_folder() / "out"))
             self.assertIn(named, self.assert_only_problem("calibration", *arguments)["text"])

@@ -105,9 +105,13 @@ class Doctor(InputTest):
             self.assertEqual((list(found), found["calibration"]["verdict"]), (["images", "calibration", "times"], "ok"))
 
     def test_turned_images_are_not_said_to_be_late(self):
-        found = self.examine(self.changed_street(numpy.rot90), code=2)
+        street = self.changed_street(numpy.rot90)
+        found = self.examine(street, code=2)
         self.assertIn("turned by 90 degrees", found["calibration"]["text"])
-        self.assertNotIn("moments", found)
+        alone = self.examine("--left", street / "image_0/*.png", "--right", street / "image_1/*.png", code=2)
+        for findings in (found, alone):
+            self.assertEqual([name for name in ("rows", "sides", "range", "moments") if name in findings], ["rows"])
+            self.assertIn("turned by 90 degrees: turn them back", findings["rows"]["remedy"])
 
     def test_images_of_other_moments_or_of_nothing(self):
         street = self.broken_street()
@@ -139,6 +143,8 @@ class Doctor(InputTest):
                 image[1::2] = read_grey(self.street / f"image_{side}/{i + 1:06d}.png")[1::2]
                 write_grey(street / f"image_{side}/{i:06d}.png", image)
         self.assertIn("interlaced", self.assert_only_problem("images", street)["text"])
+        brighter = 20 * (numpy.arange(HEIGHT) % 2)[:, None]  # as some sensors' rows are
+        self.assertEqual(self.examine(self.changed_street(lambda image: numpy.clip(image + brighter, 0, 255)))["images"]["verdict"], "ok")
 
     def test_right_images_that_are_turned(self):
         for name, turned in (("turned by 180 degrees", numpy.s_[::-1, ::-1]), ("upside down", numpy.s_[::-1, :])):

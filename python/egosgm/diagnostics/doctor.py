@@ -10,7 +10,7 @@ import numpy as np
 
 from .. import _egosgm
 from ..arguments import counted, json_text, Parser, tell, whole_number
-from .examination import FEWEST_MATCHES, Examination, Finding, match_pair
+from .examination import FEWEST_MATCHES, Examination, Finding, match_pair, spread
 from ..calibration.rectification import Rectification, StereoRig
 from ..sequences import add_input, frame_times, open_input, open_without_calibration, videos_of_input, words_of_input
 from ..videos import VideoSource
@@ -169,8 +169,7 @@ def _of_times(times: Sequence[float], source: str, names: Sequence[str], numbers
 def _spread_px(left: Any, right: Any) -> float:
     """Rows of 90 % of the matches are no farther apart, beside a constant; infinite where there are few."""
     matches = match_pair(left, right)
-    errors = matches[:, 3] - matches[:, 1]
-    return float(np.quantile(np.abs(errors - np.median(errors)), 0.9)) if len(errors) >= FEWEST_MATCHES else math.inf
+    return spread(matches[:, 3] - matches[:, 1]) if len(matches) >= FEWEST_MATCHES else math.inf
 
 
 def _moments(steps: Sequence[Tuple[_Pair, _Pair]]) -> List[Finding]:

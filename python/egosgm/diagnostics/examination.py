@@ -92,6 +92,11 @@ def _agreeing(matches: NDArray[np.float32], width: int, height: int) -> NDArray[
     return np.abs(terms @ candidates[counts.argmax()] - errors) <= _AGREEMENT_PX
 
 
+def spread(values: NDArray[np.float32]) -> float:
+    """How far 90 % of the values lie from the median at most."""
+    return float(np.quantile(np.abs(values - np.median(values)), 0.9))
+
+
 def _slopes(places: NDArray[np.float64], errors: NDArray[np.float64]) -> str:
     """How the misalignment changes from left to right and from top to bottom, by least squares."""
     fit = np.linalg.lstsq(places, errors, rcond=None)[0]
@@ -131,7 +136,8 @@ class Examination:
             largest = image.max()
             self._saturated[side] += np.mean(image == largest) if largest in (255, 1023, 4095, 16383, 65535) else 0
         if self._height > 2:
-            near, far = (np.abs(np.diff(rows, axis=0)).mean() for rows in (left.astype(np.float32), left[::2].astype(np.float32)))
+            rows = left - left.mean(axis=1, keepdims=True, dtype=np.float32)  # some sensors have rows that are brighter
+            near, far = (np.abs(np.diff(part, axis=0)).mean() for part in (rows, rows[::2]))
             self._interlaced += int(near > _LEAST_COMB * far)
         self._matches.append(matches)
         row_offset = float(np.median(matches[:, 3] - matches[:, 1])) if len(matches) else 0.0
@@ -159,6 +165,10 @@ class Examination:
             remedy = "give them sharper, brighter or with less noise: coarsely, left and right agree" if is_sure else \
                 "give the left and right images of the same moments, sharp, and overlapping"
             return [*found, Finding("problem", "matches", f"only {counted(len(matches), 'point')} found in both images", remedy)]
+        columns_px, rows_px = (spread(matches[:, i + 2] - matches[:, i]) if len(matches) >= FEWEST_MATCHES else 0.0 for i in (0, 1))
+        if columns_px <= _MOST_SPREAD_PX < rows_px / 2:
+            return [*found, Finding("problem", "rows", f"the views agree in columns (90 % of the points within {columns_px:.2f} px), and not in rows ({rows_px:.1f} px)",
+                                    "the images are turned by 90 degrees: turn them back; or one camera stands above the other: turn the images of both, and calibrate them so")]
         agreeing = matches[_agreeing(matches, self._width, self._height)] if len(matches) >= FEWEST_MATCHES else matches[:0]
         is_agreed = len(agreeing) >= max(FEWEST_MATCHES, _FEWEST_AGREEING * len(matches))
         found.append(self._rows(len(matches), agreeing))
