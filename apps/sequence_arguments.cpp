@@ -16,8 +16,10 @@
 namespace egosgm::app {
 namespace {
 
+/// A file, or what is none and has the marks of a pattern.
 bool is_image(const std::filesystem::path& file) {
   std::error_code error;
+  if (!std::filesystem::exists(file, error) && file.string().find_first_of("*%") != std::string::npos) return true;
   return !file.extension().empty() && std::filesystem::is_regular_file(file, error);
 }
 

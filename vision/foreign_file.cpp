@@ -55,6 +55,8 @@ std::string foreign_kind(std::string_view start, const fs::path& file) {
   };
   const std::string rosbag = "it is a recording of ROS: `egosgm run` and `doctor` take it by --bag";
   const std::string photo = "it is a HEIC or AVIF, as phones write: convert it to PNG or JPEG";
+  const std::string misnamed =
+      is_image_name(file) ? "" : "it is a PNG or JPEG under another name: name it .png, .jpg or .jpeg";
   const Kind kinds[] = {
       {0, "version https://git-lfs", "it is a pointer of Git LFS, in place of which `git lfs pull` puts the file"},
       {4, "ftyphei", photo},
@@ -62,6 +64,9 @@ std::string foreign_kind(std::string_view start, const fs::path& file) {
       {4, "ftypavif", photo},
       {4, "ftyp", kVideo},
       {0, "GIF8", "it is a GIF: write its pictures as PNG"},
+      {0, "\xff\xd8\xff", misnamed},
+      {0, "\x89PNG", misnamed},
+      {4, "jP  ", "it is JPEG 2000: convert it to PNG"},
       {0, "\x93NUMPY", "it is an array of NumPy: in Python, egosgm.run takes pairs of images; or write them as PNG"},
       {8, "AVI ", kVideo},
       {0, "\x30\x26\xb2\x75", kVideo},  // Windows Media
@@ -129,6 +134,9 @@ std::string foreign_input(const fs::path& path) {
       {{".mpo"},
        "it holds both pictures of a 3D camera (MPO), which `egosgm rectify --side-by-side` reads, with the camera's "
        "calibration"},
+      {{".jps", ".pns"},
+       "it holds both views of a 3D picture side by side: named .jpg or .png, `egosgm rectify --side-by-side` reads it, "
+       "with the camera's calibration"},
       {{".svo", ".svo2"},
        "it is a recording of a ZED: its SDK's ZED_SVO_Export makes a video of it, left and right, which `egosgm "
        "rectify --side-by-side` reads"},

@@ -132,10 +132,11 @@ def test_of_rectified_images_of_another_size(tmp_path):
     (tmp_path / "flat.json").write_text(RECTIFIED["flat.json"])
     (tmp_path / "q.json").write_text(json.dumps(dict(Q=Q, image_size=[WIDTH, HEIGHT])))
     (tmp_path / "nested.json").write_text(json.dumps(dict(Q=Q, image_size=dict(width=WIDTH, height=HEIGHT))))
+    (tmp_path / "text.json").write_text(json.dumps(dict(Q=Q, resolution=f"{WIDTH}x{HEIGHT}")))
     (tmp_path / "inner.json").write_text(json.dumps(dict(intrinsics=dict(fx=F, cx=CX, cy=CY, width=WIDTH, height=HEIGHT), baseline=B)))
     (tmp_path / "kitti.txt").write_text(RECTIFIED["kitti.txt"].replace("P", "P_rect_0") + f"S_rect_00: {WIDTH} {HEIGHT}\n")
     (tmp_path / "middlebury.txt").write_text(f"cam0=[{F} 0 {CX}; 0 {F} {CY}; 0 0 1]\ncam1=[{F} 0 {CX}; 0 {F} {CY}; 0 0 1]\nbaseline={1000 * B}\nwidth={WIDTH}\nheight={HEIGHT}\n")
-    for name in ("kalibr.yaml", "left.yaml", "orb_slam.yaml", "flat.json", "q.json", "nested.json", "inner.json", "kitti.txt", "middlebury.txt"):
+    for name in ("kalibr.yaml", "left.yaml", "orb_slam.yaml", "flat.json", "q.json", "nested.json", "text.json", "inner.json", "kitti.txt", "middlebury.txt"):
         expect_rectified(read(name, np.array([WIDTH, HEIGHT])))
         with pytest.raises(egosgm.InvalidArgument, match=f"{name}.*is of images of 640x480, and these have 320x240"):
             read(name, (WIDTH // 2, HEIGHT // 2))
@@ -315,7 +316,7 @@ def test_virtual_kitti(tmp_path):
 
 @pytest.mark.parametrize("content, named", [
     (b"\x80\x04\x95", "a pickle of Python"), (b"MATLAB 5.0 MAT-file", "a file of MATLAB"), (b"\x89HDF\r\n", "a file of MATLAB"),
-    ("fx = 460\n".encode("utf-16"), "is UTF-16"), ("fx: 460\ncx: 320\n".encode("utf-16-le"), "is UTF-16"), (b"<!DOCTYPE html>\n<html><body/></html>", "is a web page"),
+    ("fx = 460\n".encode("utf-16"), "is UTF-16"), ("fx: 460\ncx: 320\n".encode("utf-16-le"), "is UTF-16"), (b"\x89PNG\r\n", "is a picture"), (b"<!DOCTYPE html>\n<html><body/></html>", "is a web page"),
 ])
 def test_files_that_are_no_text(content, named, tmp_path):
     (tmp_path / "calib").write_bytes(content)

@@ -473,6 +473,8 @@ TEST_F(DatasetTest, WhatIsGivenInPlaceOfAFolderIsNamed) {
                                                        {std::string("\0\0\0\x18", 4) + "ftypmp42", "is a video"},
                                                        {std::string("\0\0\0\x18", 4) + "ftypheic", "a HEIC"},
                                                        {"GIF89a", "a GIF"},
+                                                       {"\xff\xd8\xff", "under another name: name it"},
+                                                       {std::string("\0\0\0\x0cjP  ", 8), "JPEG 2000"},
                                                        {"\x93NUMPY", "an array of NumPy"},
                                                        {kOwnCalibration, "is a calibration: give the folder"},
                                                        {"\x89MCAP0", "by --bag"},
@@ -488,7 +490,7 @@ TEST_F(DatasetTest, WhatIsGivenInPlaceOfAFolderIsNamed) {
   add_text("DSCF0001.MPO", "\xff\xd8\xff");
   expect_refused([&] { open_folder(root_ / "DSCF0001.MPO"); }, {"both pictures of a 3D camera", "--side-by-side"});
   for (const auto& [name, named] :
-       {std::pair{"pair.npz", "arrays of NumPy"}, {"left.h264", "-c copy FILE.mkv"}, {"pairs.csv", "rectify --list"}}) {
+       {std::pair{"pair.npz", "arrays of NumPy"}, {"left.h264", "-c copy FILE.mkv"}, {"3d.jps", "named .jpg or .png"}, {"pairs.csv", "rectify --list"}}) {
     add_text(name, "PK\x03\x04");
     expect_refused([&, file = root_ / name] { open_folder(file); }, {name, named});
   }
@@ -510,6 +512,8 @@ TEST_F(DatasetTest, WhatIsGivenInPlaceOfAFolderIsNamed) {
   expect_refused([&] { open_folder("file:///a/drive"); }, {"it is an address: give the path alone, /a/drive"});
   expect_refused([&] { open_folder("~/drive"); }, {"write its path out"});
   expect_refused([&] { open_folder("https://x.org/drive.zip"); }, {"an address of the web: download"});
+  add_images({"single"});
+  expect_refused([&] { open_folder(root_ / "single.png"); }, {"give both pictures of a pair"});
   expect_refused([&] { open_folder(root_ / "left/*.png"); }, {"it is a pattern: give --left PATTERN"});
 }
 

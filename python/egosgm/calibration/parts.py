@@ -70,7 +70,7 @@ def expect_upright(numbers: Optional[Matrix], name: str, file: pathlib.Path) -> 
 
 
 def size_of(value: Any) -> Optional[Tuple[int, int]]:
-    numbers = matrix(value, (2,)) if value is not None else None
+    numbers = matrix(re.findall(r"\d+", value) if isinstance(value, str) else value, (2,)) if value is not None else None  # 640x480, too
     return (int(numbers[0]), int(numbers[1])) if numbers is not None else None
 
 

@@ -153,6 +153,8 @@ def _found(file: pathlib.Path, is_fisheye: bool, size: Optional[Tuple[int, int]]
         raise parts.refuse(file, "is a pipe or a device; give a file" if file.exists() else "no such file")
     with open(file, "rb") as stream:
         start = stream.read(8)
+    if start.startswith((b"\x89PNG", b"\xff\xd8\xff")):
+        raise parts.refuse(file, "is a picture: give the file of the cameras' calibration")
     if start.startswith((b"\x80", b"MATLAB", b"\x89HDF")):
         kind, remedy = ("a file of MATLAB", "write its matrices as JSON, by jsonencode, or of OpenCV's names") if not start.startswith(b"\x80") else \
             ("a pickle of Python, which may run programs", "save its matrices by numpy.savez, or as JSON")
