@@ -60,7 +60,7 @@ void SequenceArguments::add_to(CLI::App& command) {
       "DATASET,--dataset", folder, "DIR",
       "folder in the layout of KITTI odometry, KITTI raw or Middlebury, whichever it is, or with left and right, or "
       "with a folder for each pair, or with left_1.png, right_1.png and so on; with their calib.txt, or with --calib");
-  input.add("RIGHT", other_picture, "", "where DATASET is the left picture of a pair, the right one");
+  input.add("RIGHT", other_picture, "", "where DATASET is the left picture of a pair, or its pattern, the right one");
   input.add("--odometry", odometry, "DIR",
             "KITTI odometry sequence: image_0, image_1 (or image_2, image_3), calib.txt");
   input.add("--kitti", kitti, "DIR",

@@ -135,7 +135,8 @@ std::string foreign_input(const fs::path& path) {
        "it holds both pictures of a 3D camera (MPO), which `egosgm rectify --side-by-side` reads, with the camera's "
        "calibration"},
       {{".jps", ".pns"},
-       "it holds both views of a 3D picture side by side: named .jpg or .png, `egosgm rectify --side-by-side` reads it, "
+       "it holds both views of a 3D picture side by side: named .jpg or .png, `egosgm rectify --side-by-side` reads "
+       "it, "
        "with the camera's calibration"},
       {{".svo", ".svo2"},
        "it is a recording of a ZED: its SDK's ZED_SVO_Export makes a video of it, left and right, which `egosgm "

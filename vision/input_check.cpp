@@ -96,10 +96,11 @@ std::optional<Suspicion> suspect_calibration(const Calibration& c, Size size) {
   const bool is_off = !is_within(x, kMaxOffBoth) && !is_within(y, kMaxOffBoth);
   if (is_off && is_within((c.cx + 0.5) / size.height, kMaxOffBoth / 2) &&
       is_within((c.cy + 0.5) / size.width, kMaxOffBoth / 2)) {
-    return Suspicion{formatted("the principal point (cx %.1f, cy %.1f) is that of images of %dx%d: these of ", c.cx,
-                               c.cy, size.height, size.width) +
-                         of_size + " are turned by 90 degrees, or cx and cy are exchanged",
-                     "turn them back, as only so do the cameras stand side by side; exchange cx and cy where they stand upright"};
+    return Suspicion{
+        formatted("the principal point (cx %.1f, cy %.1f) is that of images of %dx%d: these of ", c.cx, c.cy,
+                  size.height, size.width) +
+            of_size + " are turned by 90 degrees, or cx and cy are exchanged",
+        "turn them back, as only so do the cameras stand side by side; exchange cx and cy where they stand upright"};
   }
   const bool is_far = !is_within(x, kMaxOffMiddle) || !is_within(y, kMaxOffMiddle);
   const bool is_scaled = is_off && (x > 0.5) == (y > 0.5);

@@ -489,8 +489,10 @@ TEST_F(DatasetTest, WhatIsGivenInPlaceOfAFolderIsNamed) {
   }
   add_text("DSCF0001.MPO", "\xff\xd8\xff");
   expect_refused([&] { open_folder(root_ / "DSCF0001.MPO"); }, {"both pictures of a 3D camera", "--side-by-side"});
-  for (const auto& [name, named] :
-       {std::pair{"pair.npz", "arrays of NumPy"}, {"left.h264", "-c copy FILE.mkv"}, {"3d.jps", "named .jpg or .png"}, {"pairs.csv", "rectify --list"}}) {
+  for (const auto& [name, named] : {std::pair{"pair.npz", "arrays of NumPy"},
+                                    {"left.h264", "-c copy FILE.mkv"},
+                                    {"3d.jps", "named .jpg or .png"},
+                                    {"pairs.csv", "rectify --list"}}) {
     add_text(name, "PK\x03\x04");
     expect_refused([&, file = root_ / name] { open_folder(file); }, {name, named});
   }
