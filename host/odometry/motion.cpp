@@ -19,8 +19,10 @@ constexpr double kCauchy2 = 2;
 constexpr double kCorrelated = 2.3;
 constexpr std::size_t kFullPart = 3;  // matches from which on a part of the image counts in full
 constexpr double kPart_px = 80;       // side of a part of the image in RANSAC
-// Disparities of static points change as the motion says: errors of the calibration move their median by 0.1 px.
-constexpr double kDisparityBias_px = 0.3;
+// Disparities of static points change as the motion says. Errors of the calibration and of matching move their median,
+// by more where images are larger. What moves with the camera changes by all that the motion does not explain.
+constexpr double kUnexplainedGrowth_px = 0.3;
+constexpr double kUnexplainedPart = 0.5;
 
 // SplitMix64 (Steele et al., OOPSLA 2014): the same numbers on every platform.
 class Generator {
@@ -165,16 +167,25 @@ std::string too_few(const StereoOdometryOptions& options, std::size_t inliers, s
   return {};
 }
 
-// By how much the inliers' disparities grew beyond what the motion explains, in the median [px].
-double disparity_bias_px(const Calibration& calibration, const Scene& scene, const MotionEstimate& estimate) {
-  std::vector<double> errors;
-  for (const int i : estimate.inliers) {
-    const Eigen::Vector3d p = estimate.motion.current_from_previous * scene.points[i];
-    errors.push_back(scene.measured[i].z() - project(calibration, p).z());
-  }
-  const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
-  std::nth_element(errors.begin(), middle, errors.end());
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
   return *middle;
+}
+
+// By how much the inliers' disparities grew, and by how much beyond what the motion explains: medians [px].
+struct DisparityGrowth {
+  double all_px, unexplained_px;
+};
+
+DisparityGrowth disparity_growth(const Calibration& calibration, const Scene& scene, const MotionEstimate& estimate) {
+  std::vector<double> all, unexplained;
+  for (const int i : estimate.inliers) {
+    const double now = scene.measured[i].z();
+    all.push_back(now - project(calibration, scene.points[i]).z());
+    unexplained.push_back(now - project(calibration, estimate.motion.current_from_previous * scene.points[i]).z());
+  }
+  return {median(std::move(all)), median(std::move(unexplained))};
 }
 
 struct NormalEquations {
@@ -295,12 +306,13 @@ MotionEstimate refine_motion(const Calibration& calibration, const StereoOdometr
   collect_inliers(calibration, scene, options.inlier_threshold_px, estimate);
   estimate.reason = too_few(options, estimate.inliers.size(), matches.size());
   if (!estimate.reason.empty()) return estimate;
-  const double bias_px = disparity_bias_px(calibration, scene, estimate);
-  if (std::abs(bias_px) > kDisparityBias_px) {
+  const DisparityGrowth growth = disparity_growth(calibration, scene, estimate);
+  const double most_px = std::max(kUnexplainedGrowth_px, kUnexplainedPart * std::abs(growth.all_px));
+  if (std::abs(growth.unexplained_px) > most_px) {
     estimate.reason = format(
         "disparities changed by %+.2f px more than the motion explains (at most %.2f px): the features "
         "move with the camera, as a projector's dots do",
-        bias_px, kDisparityBias_px);
+        growth.unexplained_px, most_px);
     return estimate;
   }
   sums = accumulate(calibration, noise, matches, estimate.inliers, estimate.motion.current_from_previous);

@@ -150,6 +150,22 @@ TEST(OdometryMotion, RefusesFeaturesThatMoveWithTheCamera) {
   }
 }
 
+// Large images have larger errors: half a pixel is little where the motion explains two.
+TEST(OdometryMotion, TakesErrorsOfDisparitiesThatAreSmallBesideTheirChange) {
+  std::mt19937 generator(7);
+  const Calibration calibration = kitti_calibration();
+  const auto reason = [&](double forward_m, double error_px) {
+    const Eigen::Isometry3d truth = make_motion(0, 0, -forward_m, 0);
+    std::vector<PointMatch> matches = random_matches(generator, calibration, truth, 300, 0.1);
+    for (PointMatch& match : matches) match.d2 += error_px;
+    return odometry::refine_motion(calibration, {}, {}, matches, truth).reason;
+  };
+  for (const double error_px : {0.5, -0.5}) {
+    EXPECT_EQ(reason(1.2, error_px), "");
+    EXPECT_NE(reason(0.05, error_px), "");
+  }
+}
+
 // The pair's error grows with x^2 and x y; each frame sees new points.
 TEST(OdometryRectification, LearnsYawAndDistortionButNothingFromAnExactPair) {
   const Calibration c = kitti_calibration();
