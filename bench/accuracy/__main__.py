@@ -7,6 +7,7 @@
   python3 bench/accuracy --ablation           every correction on and off, on four kinds of input apart
   python3 bench/accuracy --evidence           places without evidence: what is filled there, what is wrong, what was gained over the single frame
   python3 bench/accuracy --video              over time: beside the single frame, OpenCV and its maps averaged in time; wrong motions, dropped frames
+  python3 bench/accuracy --search SECONDS     better constants of the method by the figures of many inputs (docs/develop/search.md)
   python3 bench/accuracy --paper      the table of Fucek et al. (IFAC 2017) on all scenes at hand, and its figure of a frame's stages
   python3 bench/accuracy --paper --kitti2015 DIR --scenes 84,87,130,146,148 --frames 0:10
                                       and on scenes of KITTI 2015's multi-view data
@@ -25,6 +26,7 @@ from evidence import evidence_tables
 from inputs import PROJECT, Bench, Failed, Missing, told
 from paper import paper_figure, paper_table
 from rows import main_table
+from search import Search
 from video import video_tables
 
 
@@ -53,7 +55,11 @@ def parse_arguments():
     parser.add_argument("--evidence", action="store_true", help="places without evidence, and nothing else")
     parser.add_argument("--ego-motion", action="store_true", help="stereo odometry alone, and nothing else")
     parser.add_argument("--ablation", action="store_true", help="every correction on and off, on four kinds of input apart, and nothing else")
-    parser.add_argument("--inputs", metavar="REGEX", default="", help="only these inputs of --ablation, by title")
+    parser.add_argument("--search", metavar="SECONDS", type=float, help="search for better constants for so long, and nothing else")
+    parser.add_argument("--constants", metavar="REGEX", default="", help="only these constants of --search, by name: 'banded_sgm', 'EGOSGM_EVIDENCE', ...")
+    parser.add_argument("--sequences", metavar="DIR", nargs="+", help="inputs of --search: recorded sequences with truth, in place of the bench's")
+    parser.add_argument("--seed", type=int, default=1, help="the order in which --search tries constants (1)")
+    parser.add_argument("--inputs", metavar="REGEX", default="", help="only these inputs of --ablation and --search, by title")
     parser.add_argument("--paper", action="store_true", help="the paper's table and its figure of a frame's stages, and nothing else")
     parser.add_argument("--kitti2015", metavar="DIR", help="more scenes for --paper: KITTI 2015 multi-view data")
     parser.add_argument("--scenes", metavar="LIST", default="84,87,130,146,148", help="of --kitti2015")
@@ -86,6 +92,9 @@ def main():
     elif arguments.ablation:
         content["ablation"], skipped = ablation(bench, arguments.inputs)
         rows, code = content["ablation"], 0
+    elif arguments.search:
+        content["search"] = Search(bench, arguments).run(arguments.search, arguments.constants)
+        rows, skipped, code = ["the start's figures"], [], 0
     elif arguments.evidence:
         content["evidence"] = evidence_tables(bench, re.compile(arguments.only))
         rows = [row for table in content["evidence"].values() for row in table["rows"]]
