@@ -25,6 +25,7 @@ from egosgm.bag import outputs as bag_outputs
 from egosgm.bag import program as bag_program
 from egosgm.bag import ros_images
 from egosgm.geometry import cloud as cloud_program
+from refusals import expect_refused
 
 WIDTH, HEIGHT, FRAMES = 320, 96, 3
 SEED = 7
@@ -421,8 +422,7 @@ def test_stamps_pair_within_their_bound_and_gaps_are_told(tmp_path, street, fram
     text = bag.gaps.text()
     assert "1 left and 0 right images have no partner" in text and "differ by up to 2.000 ms" in text
     assert "1 gap, the longest of 1.500 s before frame 2" in text and "steps back 1 times" in text
-    with pytest.raises(egosgm.InvalidArgument, match="nearest stamps differ by 2.000 ms: allow that by --max-skew-ms"):
-        list(bags.Bag(path, "/left/image_rect", "/right/image_rect").frames())
+    expect_refused("nearest stamps differ by 2.000 ms: allow that by --max-skew-ms", lambda: list(bags.Bag(path, "/left/image_rect", "/right/image_rect").frames()))
 
 
 def test_messages_that_were_received_out_of_order(tmp_path, street, frames):
@@ -512,8 +512,7 @@ def test_without_stamps_the_times_of_the_recording_are_taken(tmp_path, street, f
     found = list(bag.frames())
     assert [frame.stamp_ns for frame in found] == [START + i * RATE_NS for i in range(FRAMES)] and not found[1].starts_anew
     assert "the images have no stamps: the times at which they were recorded are taken" in bag.gaps.text()
-    with pytest.raises(egosgm.InvalidArgument, match=r"differ by 1.000 ms: allow that by --max-skew-ms \(images have no stamps here"):
-        list(bags.Bag(path, "/left/image_rect", "/right/image_rect").frames())
+    expect_refused(r"differ by 1.000 ms: allow that by --max-skew-ms \(images have no stamps here", lambda: list(bags.Bag(path, "/left/image_rect", "/right/image_rect").frames()))
 
 
 @pytest.mark.parametrize("kind, suffix", [("mcap", ".mcap"), ("sqlite", ".db3"), ("ros1", ".bag")])
@@ -532,12 +531,10 @@ def test_the_parts_of_a_bag_in_a_folder_that_nothing_describes(kind, suffix, tmp
     (tmp_path / "none").mkdir()
     for folder in (tmp_path / "none", tmp_path / "parts"):
         (folder / "notes.txt").write_text("not a bag")
-    with pytest.raises(egosgm.InvalidArgument, match="none: holds no bag, neither metadata.yaml nor .mcap"):
-        bags.Bag(tmp_path / "none")
+    expect_refused("none: holds no bag, neither metadata.yaml nor .mcap", lambda: bags.Bag(tmp_path / "none"))
     bag = bags.Bag(tmp_path / "parts", "/left/image_rect", "/right/image_rect")
     assert [(frame.stamp_ns - START) // RATE_NS for frame in bag.frames()] == [0, 1] and len(bag) == 2
-    with pytest.raises(egosgm.InvalidArgument, match='no topic "/left/camera_info"; its topics of camera infos: none; without them give --calib'):
-        bags.Bag(tmp_path / "parts" / f"part_1{suffix}", "/left/image_rect", "/right/image_rect")
+    expect_refused('no topic "/left/camera_info"; its topics of camera infos: none; without them give --calib', lambda: bags.Bag(tmp_path / "parts" / f"part_1{suffix}", "/left/image_rect", "/right/image_rect"))
 
 
 def test_a_calibration_takes_the_place_of_camera_infos(tmp_path, street, frames, capfd):
@@ -557,8 +554,7 @@ def test_a_calibration_takes_the_place_of_camera_infos(tmp_path, street, frames,
     camera = dict(intrinsics=[c.fx, c.fy, c.cx, c.cy], resolution=[WIDTH // 2, HEIGHT // 2])
     shift = [[1, 0, 0, -c.baseline_m], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
     (tmp_path / "chain.json").write_text(json.dumps(dict(cam0=camera, cam1=dict(camera, T_cn_cnm1=shift))))
-    with pytest.raises(egosgm.InvalidArgument, match=f"is of images of {WIDTH // 2}x.*, and these have {WIDTH}x{HEIGHT}"):
-        next(bags.Bag(path, *topics, calib=tmp_path / "chain.json").frames())
+    expect_refused(f"is of images of {WIDTH // 2}x.*, and these have {WIDTH}x{HEIGHT}", lambda: next(bags.Bag(path, *topics, calib=tmp_path / "chain.json").frames()))
 
     for camera in (0, 1):  # of EuRoC, turned by a little
         folder = tmp_path / f"mav0/cam{camera}"
@@ -629,11 +625,9 @@ def test_encodings_give_the_same_grey(street, frames):
     np.testing.assert_array_equal(read(yuv, "yuyv"), grey)
     np.testing.assert_array_equal(read(yuv[:, :, ::-1], "uyvy"), grey)
     np.testing.assert_array_equal(read(np.repeat(grey[:, :, None], 4, axis=2), "8UC4"), grey)
-    with pytest.raises(egosgm.InvalidArgument, match="32FC1"):
-        read(grey.astype(np.float32), "32FC1")
+    expect_refused("32FC1", lambda: read(grey.astype(np.float32), "32FC1"))
     message.step = WIDTH - 1
-    with pytest.raises(egosgm.InvalidArgument, match="rows of"):
-        ros_images.grey_of(message)
+    expect_refused("rows of", lambda: ros_images.grey_of(message))
 
 
 @pytest.mark.parametrize("order", ["rggb", "bggr", "gbrg", "grbg"])
@@ -661,8 +655,7 @@ def test_compressed_images_are_read(tmp_path, street, frames):
     frame, = bags.Bag(path, "/left/image_rect/compressed", "/right/image_rect/compressed").frames()
     np.testing.assert_array_equal(frame.left, expected)
     recording.messages[-1][3].data = np.frombuffer(b"no image at all", np.uint8)
-    with pytest.raises(egosgm.InvalidArgument, match="compressed image .png. cannot be read"):
-        ros_images.grey_of(recording.messages[-1][3])
+    expect_refused("compressed image .png. cannot be read", lambda: ros_images.grey_of(recording.messages[-1][3]))
 
 
 def test_raw_images_are_rectified_by_their_infos(street):
@@ -755,8 +748,7 @@ def test_poses_of_the_bag_are_the_motion(tmp_path, street, frames):
     (dict(pose_topic="/odom"), "its topics of poses: none"), (dict(max_skew_ms=-1), "max skew -1"), (dict(pose_axes="x"), 'pose axes "x"')])
 def test_wrong_arguments_are_refused_by_name(change, named, tmp_path, street, frames):
     path = record("mcap", tmp_path / "drive", street, frames[:1])
-    with pytest.raises(egosgm.InvalidArgument, match=named):
-        bags.Bag(path, **{**dict(left_topic="/left/image_rect", right_topic="/right/image_rect"), **change})
+    expect_refused(named, lambda: bags.Bag(path, **{**dict(left_topic="/left/image_rect", right_topic="/right/image_rect"), **change}))
 
 
 def refused(capfd, arguments, *named, code=2):

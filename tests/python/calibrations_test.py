@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import egosgm
+from refusals import expect_refused
 
 yaml = pytest.importorskip("yaml")
 
@@ -138,10 +139,8 @@ def test_of_rectified_images_of_another_size(tmp_path):
     (tmp_path / "middlebury.txt").write_text(f"cam0=[{F} 0 {CX}; 0 {F} {CY}; 0 0 1]\ncam1=[{F} 0 {CX}; 0 {F} {CY}; 0 0 1]\nbaseline={1000 * B}\nwidth={WIDTH}\nheight={HEIGHT}\n")
     for name in ("kalibr.yaml", "left.yaml", "orb_slam.yaml", "flat.json", "q.json", "nested.json", "text.json", "inner.json", "kitti.txt", "middlebury.txt"):
         expect_rectified(read(name, np.array([WIDTH, HEIGHT])))
-        with pytest.raises(egosgm.InvalidArgument, match=f"{name}.*is of images of 640x480, and these have 320x240"):
-            read(name, (WIDTH // 2, HEIGHT // 2))
-    with pytest.raises(egosgm.InvalidArgument, match="size 640: give .width, height."):
-        read("kalibr.yaml", WIDTH)
+        expect_refused(f"{name}.*is of images of 640x480, and these have 320x240", lambda: read(name, (WIDTH // 2, HEIGHT // 2)))
+    expect_refused("size 640: give .width, height.", lambda: read("kalibr.yaml", WIDTH))
     (tmp_path / "kalibr_lens.yaml").write_text(RAW["kalibr_lens.yaml"])
     expect_raw(read("kalibr_lens.yaml", (WIDTH, HEIGHT)))
 
@@ -149,14 +148,12 @@ def test_of_rectified_images_of_another_size(tmp_path):
 def test_a_q_of_swapped_cameras_is_refused(tmp_path):
     for last, named in ((-1 / B, "a baseline of -0.3 m: are left and right swapped"), (0, "no baseline")):
         (tmp_path / "q.json").write_text(json.dumps(dict(Q=[*Q[:3], [0, 0, last, 0]])))
-        with pytest.raises(egosgm.InvalidArgument, match=named):
-            egosgm.read_calibration(tmp_path / "q.json")
+        expect_refused(named, lambda: egosgm.read_calibration(tmp_path / "q.json"))
 
 
 def test_two_files_of_ros_and_of_kimera(tmp_path):
     (tmp_path / "left.yaml").write_text(ros(P))
-    with pytest.raises(egosgm.InvalidArgument, match="is the calibration of one camera"):
-        egosgm.read_calibration(tmp_path / "left.yaml")
+    expect_refused("is the calibration of one camera", lambda: egosgm.read_calibration(tmp_path / "left.yaml"))
     (tmp_path / "right.yaml").write_text(ros(RIGHT_P))
     for given in ("left.yaml", "right.yaml", "."):
         expect_rectified(egosgm.read_calibration(tmp_path / given))
@@ -189,16 +186,13 @@ def test_a_file_for_each_camera_of_any_name(tmp_path):
     for change, named in ((("\nd:", "\nlens:"), "lacks distortion_coefficients"), (("d:\n- 0.0", "d:\n- x"), "d is not of finite numbers"),
                           (("r:\n- 1.0", "r:\n- x"), "r is not 9 finite numbers"), (("width: 640\n", ""), "lacks image_width or width")):
         (tmp_path / "edited.yaml").write_text(echoed(RIGHT_P, [0.0] * 5).replace(*change))
-        with pytest.raises(egosgm.InvalidArgument, match=f"edited.yaml: is a camera of ROS's calibrator,? and {named}"):
-            egosgm.read_calibration((tmp_path / "a.yaml", tmp_path / "edited.yaml"))
+        expect_refused(f"edited.yaml: is a camera of ROS's calibrator,? and {named}", lambda: egosgm.read_calibration((tmp_path / "a.yaml", tmp_path / "edited.yaml")))
     with pytest.raises(egosgm.InvalidArgument, match="a.yaml and .*b.yaml: camera info: P of both cameras have different focal lengths"):
         (tmp_path / "b.yaml").write_text(echoed(2 * np.array(RIGHT_P), [0.0] * 5))
         egosgm.read_calibration((tmp_path / "a.yaml", tmp_path / "b.yaml"))
-    with pytest.raises(egosgm.InvalidArgument, match="one file, or one for each camera"):
-        egosgm.read_calibration([tmp_path / "a.yaml"] * 3)
+    expect_refused("one file, or one for each camera", lambda: egosgm.read_calibration([tmp_path / "a.yaml"] * 3))
     (tmp_path / "c.yaml").write_text("a: 1\n")
-    with pytest.raises(egosgm.InvalidArgument, match="c.yaml: is not the calibration of one camera"):
-        egosgm.read_calibration((tmp_path / "a.yaml", tmp_path / "c.yaml"))
+    expect_refused("c.yaml: is not the calibration of one camera", lambda: egosgm.read_calibration((tmp_path / "a.yaml", tmp_path / "c.yaml")))
 
 
 OAK = dict(RAW_OAK := json.loads(RAW["oak.json"]), cameraData=[
@@ -243,8 +237,7 @@ def test_cameras_of_rovers(tmp_path):
     lens = dict(O=turn[2], R=[0, -0.1, 0.05])
     assert read(cahv(place, turn, **lens), cahv(place + B * turn[0], turn, **lens)).left_distortion.tolist() == [-0.1, 0.05, 0, 0, 0]
     for others, named in ((dict(O=[1, 0, 0.01], R=[0, -0.1, 0]), "CAHVOR, whose lens has an axis O"), (dict(E=[0, 0, 0]), "CAHVORE"), (dict(R=[0, 1, 0]), "CAHVOR")):
-        with pytest.raises(egosgm.InvalidArgument, match=f"right.cahv: is a rover's camera .CAHV.*{named}"):
-            read(cahv(place, turn), cahv(place + B * turn[0], turn, **others))
+        expect_refused(f"right.cahv: is a rover's camera .CAHV.*{named}", lambda: read(cahv(place, turn), cahv(place + B * turn[0], turn, **others)))
 
 
 @pytest.mark.parametrize("name, text", [
@@ -258,8 +251,7 @@ def test_two_cameras_that_do_not_say_how_they_stand(name, text, tmp_path):
             np.savez(file, **text)
         else:
             file.write_text(text)
-    with pytest.raises(egosgm.InvalidArgument, match="each is the calibration of one camera alone, and neither says how the cameras stand"):
-        egosgm.read_calibration(files)
+    expect_refused("each is the calibration of one camera alone, and neither says how the cameras stand", lambda: egosgm.read_calibration(files))
 
 
 TRANSPOSED = np.transpose(K).tolist()
@@ -274,8 +266,7 @@ TRANSPOSED = np.transpose(K).tolist()
 ])
 def test_transposed_matrices_are_named(text, named, tmp_path):
     (tmp_path / "calib.txt").write_text(text)
-    with pytest.raises(egosgm.InvalidArgument, match=f"{named}:? is transposed, as MATLAB writes it"):
-        egosgm.read_calibration(tmp_path / "calib.txt")
+    expect_refused(f"{named}:? is transposed, as MATLAB writes it", lambda: egosgm.read_calibration(tmp_path / "calib.txt"))
 
 
 def test_vins_and_its_cameras(tmp_path):
@@ -286,8 +277,7 @@ def test_vins_and_its_cameras(tmp_path):
     (tmp_path / "config.yaml").write_text(opencv_yaml(body_T_cam0=np.eye(4), body_T_cam1=BACK)
                                           + f"num_of_cam: 2\ncam0_calib: cam0.yaml\ncam1_calib: cam1.yaml\nimage_width: {WIDTH}\nimage_height: {HEIGHT}\n")
     expect_raw(egosgm.read_calibration(tmp_path / "config.yaml"))
-    with pytest.raises(egosgm.InvalidArgument, match="is one camera of VINS"):
-        egosgm.read_calibration(tmp_path / "cam0.yaml")
+    expect_refused("is one camera of VINS", lambda: egosgm.read_calibration(tmp_path / "cam0.yaml"))
 
 
 def test_a_zed_is_read_for_the_size_of_the_images(tmp_path):
@@ -301,8 +291,7 @@ def test_a_zed_is_read_for_the_size_of_the_images(tmp_path):
     np.testing.assert_allclose(rig.left_distortion[:4], LENS)
     np.testing.assert_allclose([rig.R[2, 1], rig.R[0, 2], rig.R[1, 0]], [0.01, 0.02, -0.03], atol=5e-4)
     for size, named in ((None, "nothing tells which"), ((640, 480), "images of 1280x720, 672x376, not of 640x480")):
-        with pytest.raises(egosgm.InvalidArgument, match=named):
-            egosgm.read_calibration(file, size=size)
+        expect_refused(named, lambda: egosgm.read_calibration(file, size=size))
 
 
 def test_virtual_kitti(tmp_path):
@@ -320,8 +309,7 @@ def test_virtual_kitti(tmp_path):
 ])
 def test_files_that_are_no_text(content, named, tmp_path):
     (tmp_path / "calib").write_bytes(content)
-    with pytest.raises(egosgm.InvalidArgument, match=named):
-        egosgm.read_calibration(tmp_path / "calib")
+    expect_refused(named, lambda: egosgm.read_calibration(tmp_path / "calib"))
 
 
 def test_arrays_of_numpy(tmp_path):
@@ -330,8 +318,7 @@ def test_arrays_of_numpy(tmp_path):
     np.savez(tmp_path / "all.npz", **arrays)
     expect_raw(egosgm.read_calibration(tmp_path / "all.npz"))
     np.savez_compressed(tmp_path / "large.npz", M1=np.zeros(1 << 20))
-    with pytest.raises(egosgm.InvalidArgument, match="large.npz: holds more than 4 MiB"):
-        egosgm.read_calibration(tmp_path / "large.npz")
+    expect_refused("large.npz: holds more than 4 MiB", lambda: egosgm.read_calibration(tmp_path / "large.npz"))
     folder = tmp_path / "arrays"
     folder.mkdir()
     for name, array in arrays.items():
@@ -357,8 +344,7 @@ def test_a_fisheye(tmp_path):
     assert egosgm.read_calibration(tmp_path / "rig.npz", is_fisheye=True).is_fisheye
     for name, text in {"radtan.yaml": kalibr(LENS), "own.txt": RECTIFIED["own.txt"], "q.yml": RECTIFIED["q.yml"]}.items():
         (tmp_path / name).write_text(text)
-        with pytest.raises(egosgm.InvalidArgument, match=f"{name}: is of rectified images, or says itself what its lenses are"):
-            egosgm.read_calibration(tmp_path / name, is_fisheye=True)
+        expect_refused(f"{name}: is of rectified images, or says itself what its lenses are", lambda: egosgm.read_calibration(tmp_path / name, is_fisheye=True))
     oak = json.loads(RAW["oak.json"])
     for kind in (1, 2):  # as DepthAI numbers its models of lenses
         for _, camera in oak["cameraData"][:2]:
@@ -366,8 +352,7 @@ def test_a_fisheye(tmp_path):
         (tmp_path / f"oak{kind}.json").write_text(json.dumps(oak))
     rig = egosgm.read_calibration(tmp_path / "oak1.json")
     assert rig.is_fisheye and rig.left_distortion.tolist() == LENS
-    with pytest.raises(egosgm.InvalidArgument, match="lenses cameraType 2 and 2"):
-        egosgm.read_calibration(tmp_path / "oak2.json")
+    expect_refused("lenses cameraType 2 and 2", lambda: egosgm.read_calibration(tmp_path / "oak2.json"))
 
 
 @pytest.mark.parametrize("text, named", [
@@ -426,11 +411,9 @@ def test_what_was_edited_is_read_or_refused(tmp_path):
 
 def test_units_are_never_guessed(tmp_path):
     (tmp_path / "chain.yaml").write_text(kalibr(LENS, T_cn_cnm1=[[1, 0, 0, -30.0], *SHIFT[1:]]))
-    with pytest.raises(egosgm.InvalidArgument, match="centimetres .0.3 m. or millimetres .0.03 m..*--unit cm.*--unit mm"):
-        egosgm.read_calibration(tmp_path / "chain.yaml")
+    expect_refused("centimetres .0.3 m. or millimetres .0.03 m..*--unit cm.*--unit mm", lambda: egosgm.read_calibration(tmp_path / "chain.yaml"))
     expect_raw(egosgm.read_calibration(tmp_path / "chain.yaml", unit_m=0.01))
     for name in ("own.txt", "q.yml"):
         (tmp_path / name).write_text(RECTIFIED[name])
-        with pytest.raises(egosgm.InvalidArgument, match=f"{name}: is of rectified images.*leave --unit"):
-            egosgm.read_calibration(tmp_path / name, unit_m=0.001)
+        expect_refused(f"{name}: is of rectified images.*leave --unit", lambda: egosgm.read_calibration(tmp_path / name, unit_m=0.001))
         expect_rectified(egosgm.read_calibration(tmp_path / name, unit_m=1))

@@ -17,6 +17,7 @@ import pytest
 import egosgm
 from egosgm import program
 from egosgm.geometry import cloud
+from refusals import expect_refused
 
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
 WIDTH, HEIGHT, FRAMES = 160, 64, 3
@@ -121,8 +122,7 @@ def test_wrong_images_are_refused_and_change_nothing(pipeline, street, frames, i
     expected = disparities_of(pipeline, street, [(f.left, f.right) for f in frames[:2]])[1]
     pipeline.reset()
     pipeline.process(frames[0].left, frames[0].right)
-    with pytest.raises(egosgm.InvalidArgument, match=named):
-        pipeline.process(image, frames[1].right, street.motion(1))
+    expect_refused(named, lambda: pipeline.process(image, frames[1].right, street.motion(1)))
     np.testing.assert_array_equal(pipeline.process(frames[1].left, frames[1].right, street.motion(1)).disparity, expected)
 
 
@@ -134,11 +134,9 @@ def test_wrong_outputs_and_motions_are_refused(pipeline, frames):
                            ({"disparity": np.zeros((HEIGHT, WIDTH))}, "float32"), ({"variance": np.zeros((3, 4), np.float32)}, ""),
                            ({"disparity": [[1.0]]}, "no NumPy array"),
                            ({"disparity": np.zeros((HEIGHT, 2 * WIDTH), np.float32)[:, ::2]}, "contiguous")):
-        with pytest.raises(egosgm.InvalidArgument, match=named):
-            pipeline.process(left, right, outputs=outputs)
+        expect_refused(named, lambda: pipeline.process(left, right, outputs=outputs))
     for motion, named in ((np.eye(3), "4x4"), (np.full((4, 4), np.nan), "finite"), (2 * np.eye(4), "otation"), ("forward", "matrix")):
-        with pytest.raises(egosgm.InvalidArgument, match=named):
-            pipeline.process(left, right, motion)
+        expect_refused(named, lambda: pipeline.process(left, right, motion))
 
 
 def test_motion_may_be_a_matrix_or_a_motion(pipeline, street, frames):
@@ -207,10 +205,8 @@ def test_odometry_finds_the_motion(street, frames):
     difference = second.motion.current_from_previous - big.motion(1).current_from_previous
     assert np.abs(difference[:3, 3]).max() < 0.1
     assert second.motion.covariance.shape == (6, 6) and second.motion.covariance.trace() > 0
-    with pytest.raises(egosgm.InvalidArgument, match="max_features"):
-        egosgm.StereoOdometry(big.calibration, max_feature=3)
-    with pytest.raises(egosgm.InvalidArgument, match="wrong type"):
-        egosgm.StereoOdometry(big.calibration, seed="x")
+    expect_refused("max_features", lambda: egosgm.StereoOdometry(big.calibration, max_feature=3))
+    expect_refused("wrong type", lambda: egosgm.StereoOdometry(big.calibration, seed="x"))
 
 
 def test_files_read_back(tmp_path, frames, street):
@@ -225,8 +221,7 @@ def test_files_read_back(tmp_path, frames, street):
     poses = np.stack([frame.world_from_camera for frame in frames])
     egosgm.write_poses(tmp_path / "poses.txt", poses)
     np.testing.assert_allclose(egosgm.read_poses(tmp_path / "poses.txt"), poses, atol=1e-8)
-    with pytest.raises(egosgm.InvalidArgument, match="nowhere.png"):
-        egosgm.read_grey(tmp_path / "nowhere.png")
+    expect_refused("nowhere.png", lambda: egosgm.read_grey(tmp_path / "nowhere.png"))
     with pytest.raises(egosgm.IoError, match="d.pfm") as failed:
         egosgm.write_pfm(tmp_path / "d.png" / "d.pfm", truth)
     assert isinstance(failed.value, OSError)
@@ -240,8 +235,7 @@ def test_metrics_and_pictures(frames, street):
     assert (counts + egosgm.compare_disparity(truth, truth)).metrics.bad_or_missing == 50
     masked = np.ma.masked_greater(truth, 5)
     for compare in (egosgm.compare_disparity, lambda estimate, truth: egosgm.evaluate_video([estimate], [truth])):
-        with pytest.raises(egosgm.InvalidArgument, match="truths?:? has a mask"):
-            compare(wrong, masked)
+        expect_refused("truths?:? has a mask", lambda: compare(wrong, masked))
         compare(wrong, masked.filled(egosgm.INVALID_DISPARITY))
     sky = egosgm.compare_disparity(wrong, np.zeros_like(truth))
     assert sky.sky == sky.sky_valid == truth.size and sky.metrics.wrong_of_all == sky.metrics.filled == 100
@@ -270,14 +264,12 @@ def test_sequences_are_read(tmp_path, frames, street):
     assert sequence.numbers == [0, 1] and sequence.note == ""
     assert egosgm.open_patterns(str(tmp_path / "left_%d.png"), str(tmp_path / "right_%d.png")).calibration is None
     names = str(tmp_path / "l*.png"), str(tmp_path / "r*.png"), tmp_path / "c.toml"
-    with pytest.raises(egosgm.InvalidArgument, match="no right image has the name"):
-        egosgm.open_patterns(*names)
+    expect_refused("no right image has the name", lambda: egosgm.open_patterns(*names))
     assert egosgm.open_patterns(*names, by_order=True).frames[1].right == sequence.frames[1].right
     left, right = sequence.frames[1].read()
     assert left.dtype == np.uint16
     np.testing.assert_array_equal(left // 256, frames[1].left)
-    with pytest.raises(egosgm.InvalidArgument, match="nowhere"):
-        egosgm.open_folder(tmp_path / "nowhere")
+    expect_refused("nowhere", lambda: egosgm.open_folder(tmp_path / "nowhere"))
 
 
 def test_all_errors_are_errors_of_the_library_and_of_python():
@@ -288,8 +280,7 @@ def test_all_errors_are_errors_of_the_library_and_of_python():
     with pytest.raises(egosgm.Error, match="fx"):
         egosgm.Calibration(fx=-1, fy=1, cx=0, cy=0, baseline_m=1)
     for given in ((np.eye(3), 0.3), ([[1, 0, 0], [0, 1, 0], [0, 0, 1]],), (460, 460, 319.5, 239.5), ("460", 460, 320, 240, 0.3)):
-        with pytest.raises(egosgm.InvalidArgument, match=r"give the numbers fx, fy, cx, cy .px. and baseline_m .m.; of a camera matrix K these are"):
-            egosgm.Calibration(*given)
+        expect_refused(r"give the numbers fx, fy, cx, cy .px. and baseline_m .m.; of a camera matrix K these are", lambda: egosgm.Calibration(*given))
 
 
 def test_the_readmes_lines_run_where_nothing_is(tmp_path, monkeypatch):

@@ -18,6 +18,7 @@ cv2 = pytest.importorskip("cv2")
 from egosgm import live
 from egosgm.calibration import raw_pairs
 from egosgm.program import run_tool
+from refusals import expect_refused
 
 WIDTH, HEIGHT, FRAMES, SEED = 320, 96, 3, 7
 OPTIONS = dict(disparities=48, paths=4)
@@ -78,10 +79,8 @@ def test_the_time_of_a_pair_is_when_the_camera_took_it_from_the_first_one_on(cam
 def test_a_link_names_the_camera_that_it_leads_to(cameras, monkeypatch):
     monkeypatch.setattr(raw_pairs.os.path, "realpath", lambda path: {"/dev/v4l/by-id/usb-a": "/dev/video0", "by-path": "/dev/video1"}.get(path, path))
     assert len(list(raw_pairs.open_pairs("/dev/v4l/by-id/usb-a", "by-path", None, None, None, None, False))) == FRAMES
-    with pytest.raises(egosgm.InvalidArgument, match="are one camera"):
-        raw_pairs.open_pairs("/dev/v4l/by-id/usb-a", "0", None, None, None, None, False)
-    with pytest.raises(egosgm.InvalidArgument, match="by-id/typo: no camera"):
-        raw_pairs.open_pairs(None, None, "/dev/v4l/by-id/typo", None, None, None, False)
+    expect_refused("are one camera", lambda: raw_pairs.open_pairs("/dev/v4l/by-id/usb-a", "0", None, None, None, None, False))
+    expect_refused("by-id/typo: no camera", lambda: raw_pairs.open_pairs(None, None, "/dev/v4l/by-id/typo", None, None, None, False))
 
 
 def test_pairs_that_nobody_asked_for_are_dropped_and_the_newest_is_given(frames, cameras, calib):
@@ -301,8 +300,7 @@ def test_the_page_gives_each_newer_picture_once_and_ends(monkeypatch):
 
 def test_a_port_that_is_in_use_is_refused():
     page = live.Page()
-    with pytest.raises(egosgm.InvalidArgument, match="--port [0-9]+: .*choose another one"):
-        live.Page(int(page.address.split(":")[2][:-1]))
+    expect_refused("--port [0-9]+: .*choose another one", lambda: live.Page(int(page.address.split(":")[2][:-1])))
     page.close()
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import egosgm
+from refusals import expect_refused
 
 WIDTH, HEIGHT, FRAMES = 96, 48, 4
 SEED = 3
@@ -47,11 +48,9 @@ def test_a_dict_may_be_changed_as_soon_as_it_was_submitted(pipeline, street, fra
 def test_maps_that_share_memory_are_refused_and_change_nothing(pipeline, frames):
     left, right = frames[0].left, frames[0].right
     one = empty()
-    with pytest.raises(egosgm.InvalidArgument, match="variance shares memory"):
-        pipeline.process(left, right, None, {"disparity": one, "variance": one})
+    expect_refused("variance shares memory", lambda: pipeline.process(left, right, None, {"disparity": one, "variance": one}))
     pipeline.submit(left, right, None, {"disparity": one})
-    with pytest.raises(egosgm.InvalidArgument, match="disparity shares memory.*collect it first"):
-        pipeline.submit(left, right, None, {"disparity": one[:]})
+    expect_refused("disparity shares memory.*collect it first", lambda: pipeline.submit(left, right, None, {"disparity": one[:]}))
     assert pipeline.under_way == 1
     assert pipeline.collect().disparity is one
 
@@ -64,8 +63,7 @@ def test_rows_that_overlap_are_copied_from_and_not_written_to(pipeline, frames):
     pipeline.reset()
     np.testing.assert_array_equal(pipeline.process(broadcast, broadcast).disparity, wanted)
     overlapping = np.lib.stride_tricks.as_strided(np.zeros(2 * WIDTH, np.float32), (HEIGHT, WIDTH), (4, 4))
-    with pytest.raises(egosgm.InvalidArgument, match="disparity"):
-        pipeline.process(frames[0].left, frames[0].right, None, {"disparity": overlapping})
+    expect_refused("disparity", lambda: pipeline.process(frames[0].left, frames[0].right, None, {"disparity": overlapping}))
 
 
 def test_arrays_that_are_not_aligned(pipeline, frames):
@@ -81,8 +79,7 @@ def test_arrays_that_are_not_aligned(pipeline, frames):
         return view
 
     np.testing.assert_array_equal(pipeline.process(*map(shifted, images)).disparity, wanted)
-    with pytest.raises(egosgm.InvalidArgument, match="disparity"):
-        pipeline.process(*images, None, {"disparity": shifted(empty())})
+    expect_refused("disparity", lambda: pipeline.process(*images, None, {"disparity": shifted(empty())}))
 
 
 def test_numbers_of_any_type_set_options(street):
@@ -90,11 +87,9 @@ def test_numbers_of_any_type_set_options(street):
         pipeline = egosgm.Pipeline(street.calibration, WIDTH, HEIGHT, p2=value, disparities=np.int32(32))
         assert pipeline.options["p2"] == 150
     for value in (150.5, float("nan"), "many"):
-        with pytest.raises(egosgm.InvalidArgument, match="option p2"):
-            egosgm.Pipeline(street.calibration, WIDTH, HEIGHT, p2=value)
+        expect_refused("option p2", lambda: egosgm.Pipeline(street.calibration, WIDTH, HEIGHT, p2=value))
     egosgm.StereoOdometry(street.calibration, max_features=np.float64(500))
-    with pytest.raises(egosgm.InvalidArgument, match="max_features"):
-        egosgm.StereoOdometry(street.calibration, max_features=0.5)
+    expect_refused("max_features", lambda: egosgm.StereoOdometry(street.calibration, max_features=0.5))
 
 
 def test_threads_that_share_an_odometry_take_turns(street, frames):
@@ -154,16 +149,14 @@ def test_random_submits_and_collects(pipeline, frames):
             with pytest.raises((egosgm.InvalidArgument, TypeError)):
                 pipeline.submit(source.choice([None, frames[0].left[:-1], frames[0].left.astype(np.float32)]), frames[0].right,
                                 None, {"disparity": empty()})
-            with pytest.raises(egosgm.InvalidArgument):
-                pipeline.submit(frames[0].left, frames[0].right, None, {"disparity": empty()[:, ::2]})
+            expect_refused("", lambda: pipeline.submit(frames[0].left, frames[0].right, None, {"disparity": empty()[:, ::2]}))
             assert pipeline.under_way == len(under_way)
         else:
             bystanders[source.randrange(len(bystanders))] = np.full((HEIGHT, WIDTH), 7, np.float32)
             gc.collect(0)
     while under_way:
         collect()
-    with pytest.raises(egosgm.InvalidArgument):
-        pipeline.collect()
+    expect_refused("", pipeline.collect)
     pipeline.reset()
     for index, result in collected:
         wanted = pipeline.process(frames[index].left, frames[index].right)
@@ -176,5 +169,4 @@ def test_random_submits_and_collects(pipeline, frames):
 def test_constants_of_the_method_are_set_by_name(street):
     pipeline = egosgm.Pipeline(street.calibration, WIDTH, HEIGHT, constants={"coarse_match.p1": 7}, **OPTIONS)
     assert pipeline.options["constants.coarse_match.p1"] == 7
-    with pytest.raises(egosgm.InvalidArgument, match="no constant"):
-        egosgm.Pipeline(street.calibration, WIDTH, HEIGHT, constants={"coarse_match.p9": 7})
+    expect_refused("no constant", lambda: egosgm.Pipeline(street.calibration, WIDTH, HEIGHT, constants={"coarse_match.p9": 7}))

@@ -13,6 +13,7 @@ try:
 except ImportError as error:  # also one of its own packages that does not load; importorskip takes exc_type since pytest 8.2
     pytest.skip(str(error), allow_module_level=True)
 from egosgm.viewer import RerunOutput
+from refusals import expect_refused
 
 WIDTH, HEIGHT, FRAMES, SEED = 320, 96, 3, 7
 OPTIONS = dict(disparities=48, paths=4)
@@ -38,10 +39,8 @@ def test_a_recording_holds_what_came(street, frames, tmp_path):
     values = subprocess.run([*rerun, "print", "-vvv", file], capture_output=True, text=True, check=True).stdout
     places = re.findall(r"┆ \[\[([-\d.e]+), ([-\d.e]+), ([-\d.e]+)\]\] +│", values)  # the last column of the camera's
     np.testing.assert_allclose([float(value) for value in places[-1]], moved[:3, 3], atol=1e-4)
-    with pytest.raises(egosgm.InvalidArgument, match="is there already"):
-        RerunOutput(file)
-    with pytest.raises(egosgm.InvalidArgument, match="no such folder"):
-        RerunOutput(tmp_path / "missing/street.rrd")
+    expect_refused("is there already", lambda: RerunOutput(file))
+    expect_refused("no such folder", lambda: RerunOutput(tmp_path / "missing/street.rrd"))
     given_up = RerunOutput(tmp_path / "given_up.rrd")
     given_up.give_up()
     assert not (tmp_path / "given_up.rrd").exists()
@@ -49,5 +48,4 @@ def test_a_recording_holds_what_came(street, frames, tmp_path):
 
 def test_without_the_package_it_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "rerun", None)
-    with pytest.raises(egosgm.InvalidArgument, match="pip install rerun-sdk"):
-        RerunOutput()
+    expect_refused("pip install rerun-sdk", RerunOutput)

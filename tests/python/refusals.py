@@ -1,0 +1,10 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is refused, and in which words: as expect_refused of the C++ tests."""
+import egosgm
+import pytest
+
+
+def expect_refused(words, call):
+    """`words`: a regular expression that the refusal holds."""
+    with pytest.raises(egosgm.InvalidArgument, match=words):
+        call()
