@@ -7,8 +7,10 @@ import math
 import os
 import pathlib
 import re
+import signal
 import sys
-from typing import Any, NoReturn
+import threading
+from typing import Any, Callable, NoReturn
 
 from . import _egosgm
 
@@ -60,6 +62,13 @@ def tell(text: str, end: str = "\n") -> None:
         pass
     except OSError as error:
         raise _egosgm.IoError(f"the standard output cannot be written: {error.strerror}") from None
+
+
+def on_interrupt(act: Callable[[], Any]) -> None:
+    """Signals that end a program call `act` instead; those that are ignored, as under nohup, stay so."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        if threading.current_thread() is threading.main_thread() and signal.getsignal(number) != signal.SIG_IGN:
+            signal.signal(number, lambda *_: act())
 
 
 def whole_number(text: str) -> int:

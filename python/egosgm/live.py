@@ -5,7 +5,6 @@ import collections
 import contextlib
 import http.server
 import pathlib
-import signal
 import sys
 import threading
 import time
@@ -13,7 +12,7 @@ import urllib.parse
 from typing import Any, Deque, Dict, Iterator, Optional, Sequence, Tuple, Union
 
 from . import _egosgm
-from .arguments import Parser, counted, say, tell
+from .arguments import Parser, counted, on_interrupt, say, tell
 from .calibration.raw_pairs import RawPair, is_camera, open_pairs
 from .calibration.rectify import Rectifier, SequenceFolder, add_calibration, unit_m
 from .drive import run
@@ -247,10 +246,7 @@ def main(arguments: Sequence[str]) -> int:
     pairs = LivePairs(given.left, given.right, side_by_side=given.side_by_side, top_bottom=given.top_bottom, calib=given.calib, unit_m=unit_m(given.unit),
                       fisheye=given.fisheye)
     video = run(pairs, pairs.calibration, lag=0, progress=False, device=given.device, **options)
-    if threading.current_thread() is threading.main_thread():
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            if signal.getsignal(number) != signal.SIG_IGN:
-                signal.signal(number, lambda *_: pairs.close())
+    on_interrupt(pairs.close)
     record = SequenceFolder(pathlib.Path(given.record)) if given.record else None
     begin_s, shown = pairs.taken_s, 0
     shown_s: Deque[float] = collections.deque(maxlen=30)  # the rate is that of the last ones

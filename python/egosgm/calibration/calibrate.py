@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from .. import _egosgm
 from ..arguments import counted, decimal, Parser, tell
 from .boards import Board, Corners, charuco, chessboard, drawn, other_size
-from .raw_pairs import RawPair, open_pairs
+from .raw_pairs import RawPair, add_pairs, pairs_of
 from .rectification import StereoRig, projections
 
 _FEWEST_VIEWS, _MANY_VIEWS, _MOST_VIEWS = 5, 15, 40  # the time grows with their cube
@@ -54,12 +54,7 @@ def _parser() -> Parser:
     parser = Parser("calibrate", description="Calibrate two cameras by pictures of a board, for `egosgm rectify`",
                     epilog="Hold the board so that it fills much of both images, near and far, tilted to all sides, and into the images' corners; 20 pairs do.\n"
                     "A view is left out whose error in a camera is above 3 times the median of all views, and above 0.3 px.")
-    add = parser.add_argument_group("input (one of)").add_argument
-    add("--left", metavar="PATTERN", help="left images: a pattern such as 'left/*.jpg' or 'left/%%06d.png', or a video")
-    add("--right", metavar="PATTERN", help="right images, likewise")
-    add("--pair-by", default="name", metavar="name|order", help="what tells which images belong together: equal texts in their names, or their order")
-    add("--side-by-side", metavar="PATTERN", help="images or a video with the left view in the left half and the right one in the right half")
-    add("--top-bottom", metavar="PATTERN", help="images or a video with the left view in the upper half and the right one in the lower half")
+    add_pairs(parser)
     add = parser.add_argument
     add("--board", required=True, metavar="CxR", help="9x6: a chessboard's inner corners, where four squares meet; with --marker a ChArUco board's squares")
     add("--square", required=True, type=decimal, metavar="M", help="side of a square, as measured on the board [m]")
@@ -109,7 +104,7 @@ class _Views:
         self.size: Optional[Tuple[int, int]] = None
         self.pairs, self.found = 0, [0, 0]
         without: List[NDArray[np.uint8]] = []
-        pairs = open_pairs(given.left, given.right, given.side_by_side, given.top_bottom, None, None, given.pair_by == "order")
+        pairs = pairs_of(given)
         for pair in pairs:
             greys = _grey(pair)
             size = greys[0].shape[1::-1]
@@ -277,8 +272,6 @@ def _next_step(given: argparse.Namespace) -> str:
 
 def main(arguments: Sequence[str]) -> int:
     given = _parser().parse(arguments)
-    if given.pair_by not in ("name", "order"):
-        raise _egosgm.InvalidArgument(f"--pair-by {given.pair_by}: choose name or order")
     board, columns, rows = _board_of(given)
     out = pathlib.Path(given.out)
     _egosgm._expect_new_file("--out", out)

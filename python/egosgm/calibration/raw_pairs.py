@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Left and right images of one moment, of files, side-by-side images, videos, lists or an EuRoC folder; colour as RGB."""
+import argparse
 import bisect
 import dataclasses
 import math
@@ -8,10 +9,10 @@ import pathlib
 import re
 import struct
 import time
-from typing import Any, Dict, Iterator, List, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, Iterator, List, Optional, Sequence, Tuple
 
 from .. import _egosgm
-from ..arguments import counted
+from ..arguments import Parser, counted
 
 os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")  # what OpenCV would say of a broken file stands in our message
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
@@ -356,3 +357,23 @@ def open_pairs(left: Optional[str], right: Optional[str], side_by_side: Optional
         if pattern:
             return _Halves(option, pattern)
     return _of_list(pathlib.Path(list_)) if list_ else _of_euroc(pathlib.Path(euroc or ""))
+
+
+def add_pairs(parser: Parser) -> Callable[..., Any]:
+    """Adds the options of a command that name raw pairs. Returns what adds more of them."""
+    add = parser.add_argument_group("input (one of)").add_argument
+    add("--left", metavar="PATTERN", help="left images: a file, a pattern such as 'left/*.jpg' or 'left/%%06d.png', or a video")
+    add("--right", metavar="PATTERN", help="right images, likewise")
+    add("--pair-by", default="name", metavar="name|order", help="what tells which --left and --right images belong together: equal texts in their names "
+        "(what * or %%d stands for), or their order")
+    add("--side-by-side", metavar="PATTERN", help="images or a video with the left view in the left half and the right one in the right half")
+    add("--top-bottom", metavar="PATTERN", help="images or a video with the left view in the upper half and the right one in the lower half")
+    return add
+
+
+def pairs_of(given: argparse.Namespace) -> RawPairs:
+    """The pairs that these options name."""
+    if given.pair_by not in ("name", "order"):
+        raise _refuse(f"--pair-by {given.pair_by}: choose name or order")
+    return open_pairs(given.left, given.right, given.side_by_side, given.top_bottom, getattr(given, "list", None), getattr(given, "euroc", None),
+                      given.pair_by == "order")

@@ -4,15 +4,13 @@ import itertools
 import os
 import pathlib
 import shlex
-import signal
 import sys
-import threading
 from typing import Any, List, Optional, Sequence, Tuple
 
 from .. import _egosgm
-from ..arguments import Parser, counted, decimal, say
+from ..arguments import Parser, counted, decimal, on_interrupt, say
 from .reader import find, read_euroc_rig
-from .raw_pairs import RawPair, open_pairs
+from .raw_pairs import RawPair, add_pairs, pairs_of
 from .rectification import Rectification, StereoRig
 
 import cv2
@@ -42,13 +40,7 @@ def add_calibration(parser: Parser) -> None:
 
 def _parser() -> Parser:
     parser = Parser("rectify", description="Make a rectified sequence of raw pairs, side-by-side images or videos, EuRoC folders, lists")
-    add = parser.add_argument_group("input (one of)").add_argument
-    add("--left", metavar="PATTERN", help="left images: a file, a pattern such as 'left/*.jpg' or 'left/%%06d.png', or a video")
-    add("--right", metavar="PATTERN", help="right images, likewise")
-    add("--pair-by", default="name", metavar="name|order", help="what tells which --left and --right images belong together: equal texts in their names "
-        "(what * or %%d stands for), or their order")
-    add("--side-by-side", metavar="PATTERN", help="images or a video with the left view in the left half and the right one in the right half")
-    add("--top-bottom", metavar="PATTERN", help="images or a video with the left view in the upper half and the right one in the lower half")
+    add = add_pairs(parser)
     add("--list", metavar="FILE", help="a text file with rows LEFT RIGHT or LEFT RIGHT SECONDS")
     add("--euroc", metavar="DIR", help="an EuRoC sequence (mav0 or its parent), with its own calibration")
     add = parser.add_argument
@@ -158,23 +150,17 @@ def main(arguments: Sequence[str]) -> int:
     given = _parser().parse(arguments)
     if not 0 <= given.alpha <= 1:
         raise _egosgm.InvalidArgument(f"--alpha {given.alpha:g}: choose from 0 to 1")
-    if given.pair_by not in ("name", "order"):
-        raise _egosgm.InvalidArgument(f"--pair-by {given.pair_by}: choose name or order")
     given.unit = unit_m(given.unit)
     if given.euroc and os.path.isdir(os.path.join(given.euroc, "mav0")):
         given.euroc = os.path.join(given.euroc, "mav0")
-    pairs = open_pairs(given.left, given.right, given.side_by_side, given.top_bottom, given.list, given.euroc, given.pair_by == "order")
+    pairs = pairs_of(given)
     stream = iter(pairs)
     first = next(stream, None)
     rectifier = Rectifier(given.calib, first.left.shape[1::-1] if first else None, given.unit, given.fisheye, given.alpha, given.euroc)
     _egosgm._expect_new_folder("--out", pathlib.Path(given.out))
     folder = SequenceFolder(pathlib.Path(given.out))
     stops: List[int] = []
-    if threading.current_thread() is threading.main_thread():
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            if signal.getsignal(number) == signal.SIG_IGN:  # as nohup has it
-                continue
-            signal.signal(number, lambda *_: stops.append(1))  # a pair that was begun is written whole
+    on_interrupt(lambda: stops.append(1))  # a pair that was begun is written whole
     say_line, note = _Lines(given.quiet), pairs.note
     if note:
         say_line(note)
