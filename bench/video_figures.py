@@ -11,7 +11,7 @@ import numpy as np
 
 import egosgm
 from egosgm.evaluation.pose_evaluation import inverse
-from egosgm.evaluation.video_evaluation import BAD_PX, is_valid, move
+from egosgm.evaluation.video_counts import BAD_PX, is_valid, move
 
 SINGLE_FRAME = {"temporal": False}
 

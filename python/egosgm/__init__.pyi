@@ -37,7 +37,7 @@ from .evaluation.video_evaluation import RegionFigures as RegionFigures
 from .evaluation.video_evaluation import VideoEvaluation as VideoEvaluation
 from .evaluation.video_evaluation import VideoFigures as VideoFigures
 from .evaluation.video_evaluation import evaluate_video as evaluate_video
-from .evaluation.video_evaluation import move_map as move_map
+from .evaluation.video_counts import move_map as move_map
 
 __version__: str
 INVALID_DISPARITY: float

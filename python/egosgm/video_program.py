@@ -14,7 +14,8 @@ from . import _egosgm
 from .evaluation import plots
 from .arguments import comparison_parser, counted, decimal, json_text, Parser, resolve_comparison, tell, text_argument
 from .evaluation.pose_evaluation import inverse
-from .evaluation.video_evaluation import Frame, VideoCounts, VideoFigures, count_frames, density_of, figures_of, regions_of
+from .evaluation.video_counts import Frame, VideoCounts, count_frames
+from .evaluation.video_evaluation import VideoFigures, density_of, figures_of, regions_of
 
 _Path = pathlib.Path
 _MOST_FLOW_BYTES = 1 << 31

@@ -342,10 +342,10 @@ def test_opw_leaves_out_what_does_not_look_alike():
 
 
 def test_the_order_is_that_of_a_stable_sort():
-    from egosgm.evaluation import video_evaluation
+    from egosgm.evaluation import video_counts
     values = np.random.default_rng(8).normal(0, 1e3, 5000).round().astype(np.float32)
     values[::7], values[::11] = 0.0, -0.0
-    np.testing.assert_array_equal(video_evaluation._order(values), np.argsort(values, kind="stable"))
+    np.testing.assert_array_equal(video_counts._order(values), np.argsort(values, kind="stable"))
 
 
 def test_regions_by_hand():

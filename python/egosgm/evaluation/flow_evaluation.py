@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import _egosgm
-from .video_evaluation import BAD_PX, flow_of, is_sky, is_valid, map_of, percent, size_text
+from .video_counts import BAD_PX, flow_of, is_sky, is_valid, map_of, size_text
+from .video_evaluation import percent
 
 MEASURES = ("d1", "d2", "fl", "sf")
 BAD_SHARE = 0.05  # an outlier is off by more than BAD_PX, and by more than this share of the truth
