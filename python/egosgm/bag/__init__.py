@@ -1,149 +1,30 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recorded drives of robots: ROS 2's MCAP and SQLite, and ROS 1's bags, by rosbags."""
 import bisect
-import collections
 import contextlib
 import dataclasses
 import itertools
 import math
 import os
 import pathlib
-from typing import Any, Collection, Deque, Iterator, List, Optional, Sequence, Tuple
+from typing import Any, Collection, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import _egosgm
 from ..calibration import reader as calibrations
-from .parts import Parts, first_line, remedy_of
 from ..calibration.rectification import StereoRig
+from .pairing import Gaps, Pairing, in_order, ms_text
+from .parts import Parts, first_line, remedy_of
 from .ros_images import BODY_FROM_OPTICAL, Cameras, are_raw, grey_of, is_set, needs, quaternion_of, rotation_of, stamp_ns
 
 _IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 # Words that tell cameras apart in names of topics.
 _SIDES = (("left", "right"), ("Left", "Right"), ("cam0", "cam1"), ("camera0", "camera1"), ("infra1", "infra2"), ("cam_0", "cam_1"),
           ("camera_0", "camera_1"), ("cam1", "cam2"), ("camera1", "camera2"), ("infra_1", "infra_2"), ("/0/", "/1/"), ("Infrared_1", "Infrared_2"))
-_MOST_INTERVALS = 1000  # the last ones, of both cameras
 _MOST_BROKEN = 10  # from the start on; then the bag is none that can be read
 _POSES = ("nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/PoseWithCovarianceStamped")
-
-
-@dataclasses.dataclass
-class Gaps:
-    """What is unusual about the times of a drive."""
-
-    unpaired_left: int = 0
-    unpaired_right: int = 0
-    nearest_ms: Optional[float] = None
-    nearest_unpaired_ms: float = math.inf
-    steps_back: int = 0
-    repeated: int = 0
-    without_pose: int = 0
-    has_no_stamps: bool = False
-    gaps: List[Tuple[int, float]] = dataclasses.field(default_factory=list)
-    largest_skew_ms: float = 0.0
-    intervals_ms: Deque[float] = dataclasses.field(default_factory=lambda: collections.deque(maxlen=_MOST_INTERVALS))
-    broken: List[str] = dataclasses.field(default_factory=list)
-    parts: List[str] = dataclasses.field(default_factory=list)
-
-    @property
-    def interval_ms(self) -> float:
-        """The usual one, as two images may come at once after a stall."""
-        return float(np.median(self.intervals_ms)) if self.intervals_ms else math.inf
-
-    def are_other_moments(self, apart_ms: float) -> bool:
-        """From about half the time between two frames on, stamps are of other moments, whatever is allowed."""
-        return apart_ms >= 0.35 * self.interval_ms
-
-    def text(self) -> str:
-        parts = list(self.parts)
-        if self.broken:
-            count = f"{len(self.broken)} broken message{'s' if len(self.broken) > 1 else ''}, whose pairs are left out"
-            parts.append(f"{count}: {self.broken[0]}")
-        if self.has_no_stamps:
-            parts.append("the images have no stamps: the times at which they were recorded are taken")
-        if self.unpaired_left or self.unpaired_right:
-            parts.append(f"{self.unpaired_left} left and {self.unpaired_right} right images have no partner")
-        if self.unpaired_left and self.unpaired_right and self.are_other_moments(self.nearest_unpaired_ms) and self.nearest_unpaired_ms < math.inf:
-            parts[-1] += f": the nearest of them differ by {_ms(self.nearest_unpaired_ms)} at {_ms(self.interval_ms)} a frame: they are of other moments"
-        elif self.unpaired_left and self.unpaired_right and self.nearest_unpaired_ms < math.inf:
-            parts[-1] += f": the nearest of them differ by {_ms(self.nearest_unpaired_ms)}, which --max-skew-ms can allow"
-        if self.largest_skew_ms:
-            parts.append(f"stamps of a pair differ by up to {self.largest_skew_ms:.3f} ms")
-            if self.are_other_moments(self.largest_skew_ms):
-                parts[-1] += f" at {_ms(self.interval_ms)} a frame: those are of other moments; give a smaller --max-skew-ms, and cameras that are triggered together"
-        if self.gaps:
-            at, longest = max(self.gaps, key=lambda gap: gap[1])
-            parts.append(f"{len(self.gaps)} gap{'s' if len(self.gaps) > 1 else ''}, the longest of {longest:.3f} s before frame {at}")
-        if self.repeated:
-            parts.append(f"{self.repeated} pairs have the stamp of the one before, and are left out")
-        if self.without_pose:
-            parts.append(f"{self.without_pose} frames lie outside of the poses' times, or in a gap of half a second: odometry finds the motion there")
-        if self.steps_back:
-            parts.append(f"time steps back {self.steps_back} times, where the method starts anew")
-        return "; ".join(parts)
-
-
-class Pairing:
-    """Left and right by their stamps, each with the nearest one, no further than `bound_ns` away. Of a side whose partner is silent
-    the last MOST_WAITING stay."""
-
-    MOST_WAITING = 64
-
-    def __init__(self, bound_ns: int) -> None:
-        self.bound_ns = bound_ns
-        self.gaps = Gaps()
-        self._waiting: Tuple[Deque[Tuple[int, Any]], Deque[Tuple[int, Any]]] = (collections.deque(), collections.deque())
-        self._last: List[Optional[int]] = [None, None]
-
-    def add(self, side: int, stamp: int, message: Any) -> Iterator[Tuple[Tuple[int, Any], Tuple[int, Any]]]:
-        waiting = self._waiting[side]
-        last = self._last[side]
-        if last is not None and stamp > last:
-            self.gaps.intervals_ms.append((stamp - last) / 1e6)
-        self._last[side] = stamp
-        if waiting and stamp < waiting[-1][0]:  # a recording that starts over
-            yield from self.end()
-        waiting.append((stamp, message))
-        if len(waiting) > self.MOST_WAITING:
-            self._drop(side)
-        yield from self._pairs(False)
-
-    def end(self) -> Iterator[Tuple[Tuple[int, Any], Tuple[int, Any]]]:
-        yield from self._pairs(True)
-        self._drop_all()
-
-    def _drop(self, side: int) -> None:
-        self._waiting[side].popleft()
-        if side:
-            self.gaps.unpaired_right += 1
-        else:
-            self.gaps.unpaired_left += 1
-
-    def _drop_all(self) -> None:
-        for side in (0, 1):
-            while self._waiting[side]:
-                self._drop(side)
-
-    def _pairs(self, is_end: bool) -> Iterator[Tuple[Tuple[int, Any], Tuple[int, Any]]]:
-        left, right = self._waiting
-        while left and right:
-            apart = abs(left[0][0] - right[0][0])
-            self.gaps.nearest_ms = min(apart / 1e6, self.gaps.nearest_ms if self.gaps.nearest_ms is not None else np.inf)
-            earlier = 0 if left[0][0] < right[0][0] else 1
-            if apart > self.bound_ns:
-                self.gaps.nearest_unpaired_ms = min(apart / 1e6, self.gaps.nearest_unpaired_ms)
-                self._drop(earlier)
-                continue
-            if apart:  # the next one of the earlier side may be nearer
-                later = self._waiting[1 - earlier][0][0]
-                if len(self._waiting[earlier]) < 2 and not is_end:
-                    return
-                if len(self._waiting[earlier]) > 1 and abs(self._waiting[earlier][1][0] - later) < apart:
-                    self._drop(earlier)
-                    continue
-            self.gaps.largest_skew_ms = max(self.gaps.largest_skew_ms, apart / 1e6)
-            yield left.popleft(), right.popleft()
 
 
 @dataclasses.dataclass
@@ -328,7 +209,7 @@ class _Reading:
         self._number, self._last, self._changed = 0, None, ""
 
     def frames(self) -> Iterator[BagFrame]:
-        for stamp, side, message in _in_order(self._stamped()):
+        for stamp, side, message in in_order(self._stamped()):
             for pair in self._pairing.add(side, stamp, message):
                 yield from self._frame_of(*pair)
         for pair in self._pairing.end():
@@ -403,30 +284,11 @@ class _Reading:
             return f"no pair is whole: {self._gaps.broken[0]}"
         none, apart = "no left image has a right one of its time", self._gaps.nearest_ms
         if apart is not None and self._gaps.are_other_moments(apart):
-            return (f"{none}; the nearest stamps differ by {_ms(apart)} at {_ms(self._gaps.interval_ms)} a frame: left and right are of other moments, "
+            return (f"{none}; the nearest stamps differ by {ms_text(apart)} at {ms_text(self._gaps.interval_ms)} a frame: left and right are of other moments, "
                     "so that nothing can be matched")
-        nearest = f"the nearest stamps differ by {_ms(apart)}: allow that by --max-skew-ms" if apart is not None else "one of the topics has no image"
+        nearest = f"the nearest stamps differ by {ms_text(apart)}: allow that by --max-skew-ms" if apart is not None else "one of the topics has no image"
         unset = " (images have no stamps here: the times at which they were recorded are taken)" if self._gaps.has_no_stamps else ""
         return f"{none}; {nearest}{unset}"
-
-
-def _ms(duration: float) -> str:
-    """Rounded up: what is told, given as a bound, is enough."""
-    return f"{math.ceil(round(duration * 1000, 6)) / 1000:.3f} ms"
-
-
-def _in_order(messages: Iterator[Tuple[int, int, Any]]) -> Iterator[Tuple[int, int, Any]]:
-    """By their stamps, where threads recorded neighbours the wrong way round; a recording that starts over by a second and more stays."""
-    held: List[Tuple[int, int, int, Any]] = []
-    for count, (stamp, side, message) in enumerate(messages):
-        if held and stamp < held[-1][0] - 1_000_000_000:
-            yield from ((stamp, side, message) for stamp, _, side, message in held)
-            held = []
-        bisect.insort(held, (stamp, count, side, message))
-        if len(held) > 8:
-            stamp, _, side, message = held.pop(0)
-            yield stamp, side, message
-    yield from ((stamp, side, message) for stamp, _, side, message in held)
 
 
 def _remedy(path: pathlib.Path) -> str:
