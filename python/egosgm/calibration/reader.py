@@ -12,8 +12,7 @@ from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, TypeVar
 import numpy as np
 
 from .. import _egosgm
-from . import formats
-from . import parts
+from . import formats, named_values, parts
 from .formats import Found
 from .rectification import StereoRig, expect_side_by_side
 
@@ -84,12 +83,12 @@ def _of_data(data: Any, file: pathlib.Path, is_fisheye: bool, size: Optional[Tup
         return formats.oak(flat, file, size)
     if isinstance(flat.get("disparity_to_depth"), dict):
         name = next((name for name in ("cams_12", "cams_03") if name in flat["disparity_to_depth"]), "cams_12")
-        return formats.of_q(parts.Values(flat["disparity_to_depth"], file, "DSEC's cam_to_cam.yaml").matrix((4, 4), name), file)
+        return named_values.of_q(parts.Values(flat["disparity_to_depth"], file, "DSEC's cam_to_cam.yaml").matrix((4, 4), name), file)
     if "Camera.fx" in flat or "Camera1.fx" in flat:
         return formats.orb_slam(flat, file, size)
     nested = {f"{outer}_{inner}": value for outer, group in flat.items() if isinstance(group, dict) and "data" not in group
               for inner, value in group.items()}
-    return formats.by_names({**nested, **flat}, file, "YAML, XML or JSON", is_fisheye, size)
+    return named_values.by_names({**nested, **flat}, file, "YAML, XML or JSON", is_fisheye, size)
 
 
 def _contents(file: pathlib.Path) -> Any:
@@ -104,7 +103,7 @@ def _contents(file: pathlib.Path) -> Any:
 def _of_two_files(files: List[pathlib.Path], size: Optional[Tuple[int, int]] = None) -> Found:
     contents = [_contents(path) for path in files]
     kinds = ["CAHV" if isinstance(data, str) else "" if not isinstance(data, dict) else "EuRoC" if "T_BS" in data else "ROS" if formats.is_info(data) else
-             "lens" if formats.is_camera(data) else "" for data in contents]
+             "lens" if named_values.is_camera(data) else "" for data in contents]
     for file, kind in zip(files, kinds):
         if not kind:
             raise parts.refuse(file, "is not the calibration of one camera, as of ROS (camera_matrix, projection_matrix), EuRoC (T_BS, intrinsics) or a rover (C, A, H, V)")
@@ -126,7 +125,7 @@ def _of_folder(folder: pathlib.Path, is_fisheye: bool, size: Optional[Tuple[int,
             return found
     arrays = [file for file in sorted(folder.glob("*.npy")) if file.is_file()]  # NumPy would wait for a pipe
     if arrays:
-        return formats.by_names({file.stem: np.load(file, allow_pickle=False) for file in arrays}, folder, "a folder of .npy", is_fisheye, size)
+        return named_values.by_names({file.stem: np.load(file, allow_pickle=False) for file in arrays}, folder, "a folder of .npy", is_fisheye, size)
     candidates = [file for file in sorted(folder.iterdir()) if file.suffix.lower() in (".yaml", ".yml", ".json", ".xml", ".txt", ".npz")]
     lefts = [file for file in candidates if re.search("left|cam0|_l[.]", file.name, re.IGNORECASE)]
     if len(lefts) == 1:
@@ -160,11 +159,11 @@ def _found(file: pathlib.Path, is_fisheye: bool, size: Optional[Tuple[int, int]]
             ("a pickle of Python, which may run programs", "save its matrices by numpy.savez, or as JSON")
         raise parts.refuse(file, f"is {kind}: it is not read; {remedy}")
     if start.startswith(b"PK"):
-        return formats.by_names(_arrays(file), file, "an archive of NumPy arrays", is_fisheye, size)
+        return named_values.by_names(_arrays(file), file, "an archive of NumPy arrays", is_fisheye, size)
     if start.startswith(b"\x93NUMPY"):
         array = np.load(file, allow_pickle=False)
         if array.shape == (4, 4):
-            return formats.of_q(array.astype(float), file)
+            return named_values.of_q(array.astype(float), file)
         raise parts.refuse(file, f"is one NumPy array of the shape {array.shape}: give the folder that holds all of them, or Q")
     try:
         calibration, calibrated = _egosgm._read_calibration(file)
@@ -180,7 +179,7 @@ def _found(file: pathlib.Path, is_fisheye: bool, size: Optional[Tuple[int, int]]
         return _of_two_files(list(_other_side(file)), size)
     if text.startswith("frame cameraID "):
         return formats.virtual_kitti(file)
-    plain = formats.foundation_stereo(text, file)
+    plain = named_values.foundation_stereo(text, file)
     if plain is not None:
         return plain
     is_own = _egosgm._is_own_calibration(file)
@@ -215,9 +214,9 @@ def read_opencv_rig(file: _Path, unit_m: float = 1.0, is_fisheye: bool = False) 
         if not isinstance(contents, dict):
             return None
         data = {**contents, **data}
-    if "left_matrix" not in formats.named(data):
+    if "left_matrix" not in named_values.named(data):
         return None
-    found = formats.by_names(data, path, "a calibration of OpenCV", is_fisheye)
+    found = named_values.by_names(data, path, "a calibration of OpenCV", is_fisheye)
     return _in_unit(found, unit_m) if isinstance(found, StereoRig) else None
 
 
