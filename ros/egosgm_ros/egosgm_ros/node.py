@@ -1,10 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node egosgm: rectified pairs in, disparity, depth, its variance, points and odometry out, by stereo_image_proc's names."""
-import contextlib
 import copy
-import ctypes
-import os
-import pathlib
 import sys
 import threading
 import time
@@ -12,14 +8,11 @@ from typing import Any, Dict, Optional, Set, Tuple
 
 import numpy as np
 import rclpy
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from nav_msgs.msg import Odometry
-from rcl_interfaces.msg import SetParametersResult
 from rclpy.event_handler import SubscriptionEventCallbacks, UnsupportedEventTypeError
 from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException
-from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
-from rclpy.parameter import Parameter
+from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
 from stereo_msgs.msg import DisparityImage
@@ -27,21 +20,12 @@ from stereo_msgs.msg import DisparityImage
 import egosgm
 from egosgm.bag import Pairing
 from egosgm.bag.ros_images import Cameras, are_raw, grey_of, is_named_rect, rgb_of, stamp_ns, variance_of_depth
-from egosgm_ros import messages
+from egosgm_ros import messages, process
+from egosgm_ros.diagnostics import SIDES, TellingNode
 from egosgm_ros.messages import Path, detections_of, disparity_of, image_of, odometry_of, points_of, transform_of
 from egosgm_ros.tf_motion import TfMotion, tf2_ros
 
-SIDES = ("left", "right")
 OUTPUTS = {"disparity": DisparityImage, "depth": Image, "variance": Image, "reason": Image, "points2": PointCloud2, "camera_info": CameraInfo}
-OWN = {"device": "", "preset": "default", "max_skew_ms": 0.0, "reliable": False, "auto_start": True, "odom_frame": "odom",
-       "publish_tf": False, "motion_frame": "", "tf_wait_s": 0.1, "compressed": False, "max_depth_sigma": 0.1, "point_reasons": "",
-       "points_without_moving": False}
-PROFILES = pathlib.Path(__file__).with_name("fastdds.xml")
-PROFILES_NAMES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")  # before Fast DDS 3, and since then
-PROFILES_NAME = PROFILES_NAMES[os.environ.get("ROS_DISTRO") not in ("humble", "iron", "jazzy")]
-LOST_ON_THE_WAY = (f"images lost on the way: the driver's shared memory does not hold them: start the driver with {PROFILES_NAME}={PROFILES}; "
-                   "where that is not enough, reliable:=true with a driver that is reliable")
-REPLACED = "pairs replaced by newer ones: more come than are matched in time"
 PAIRS_PER_LOOK = 50  # at what speaks against the input
 QUEUE_SIZE = 5  # of the middleware, as topics of sensors have it: the node empties it at once, and keeps the newest pair
 
@@ -54,31 +38,16 @@ def _differ(a: CameraInfo, b: CameraInfo) -> bool:
     return bool((a.p != b.p).any()) or size(a) != size(b)
 
 
-class EgosgmNode(LifecycleNode):
-    """Parameters: those of OWN, and every option of the pipeline by its name. They are read when the node is configured."""
+class EgosgmNode(TellingNode):
+    """Matches the newest pair in a thread of its own, and publishes what somebody listens to."""
 
     def __init__(self, **arguments: Any) -> None:
-        super().__init__("egosgm", **arguments)
-        for name, value in OWN.items():
-            self._declare(name, value)
-        try:
-            self._of_preset = egosgm.pipeline_options(self._value("preset"))
-        except ValueError:  # which on_configure says
-            self._of_preset = egosgm.pipeline_options()
-        del self._of_preset["preset"]
-        for name, value in self._of_preset.items():
-            self._declare(name, value)
-        for name in self._parameter_overrides:
-            if not self.has_parameter(name) and not name.startswith("qos_overrides."):
-                raise egosgm.InvalidArgument(f"no parameter named {name}: docs/use/robots.md lists them")
-        self._set_later: Set[str] = set()
-        self.add_on_set_parameters_callback(self._on_set)
+        super().__init__(**arguments)
         self._worker: Optional[threading.Thread] = None
-        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self.create_timer(1.0, self._tell)
         self._clear()
 
     def _clear(self) -> None:
+        self._clear_told()
         self._infos: Dict[str, CameraInfo] = {}
         self._cameras: Optional[Cameras] = None
         self._pipeline: Optional[egosgm.Pipeline] = None
@@ -89,59 +58,14 @@ class EgosgmNode(LifecycleNode):
         self._newest: Optional[Tuple[Any, Any]] = None  # the pair that is matched next
         self._wake = threading.Condition()
         self._is_active = self._is_configured = False
-        self._count = self._replaced = self._lost_on_the_way = self._frames_told = 0
-        self._lost_told = [0, 0]
-        self._problem = self._warning = ""
         self._tf: Optional[TfMotion] = None
         self._broadcaster: Any = None
         self._last_stamp: Optional[int] = None
-        self._report: Optional[egosgm.FrameReport] = None
-        self._latency_ms = 0.0
-        self._suspicion, self._suspicion_told = "", False
-        self._topics_warning = ""
-        self._told_at = time.monotonic()
-        self._warned_at: Dict[str, float] = {}
-        self._waits_since = self._told_at  # for a pair
-
-    def _declare(self, name: str, default: Any) -> None:
-        """A whole number is a text or a fraction where one is wanted: device:=0, max_skew_ms:=5."""
-        given = self._parameter_overrides.get(name)
-        if given is not None and type(given.value) is int and type(default) in (str, float):
-            self._parameter_overrides[name] = Parameter(name, value=type(default)(given.value))
-        self.declare_parameter(name, default)
-
-    def _value(self, name: str) -> Any:
-        return self.get_parameter(name).value
-
-    def _options(self) -> Dict[str, Any]:
-        """The preset, and over it what the user set."""
-        changed = {name: self._value(name) for name, value in self._of_preset.items() if name in self._set_later or self._value(name) != value}
-        return {"preset": self._value("preset"), **{name.replace(".", "__"): value for name, value in changed.items()}}
-
-    def _on_set(self, parameters: Any) -> SetParametersResult:
-        late = [parameter.name for parameter in parameters if self._is_configured and parameter.name in (*OWN, *self._of_preset)]
-        if late:
-            return SetParametersResult(successful=False, reason=f"{late[0]} is read when the node is configured: clean it up, set the parameter, configure it again")
-        self._set_later.update(parameter.name for parameter in parameters)
-        return SetParametersResult(successful=True)
 
     def on_configure(self, state: Any) -> TransitionCallbackReturn:
         self._clear()
         try:
-            if not 0 <= self._value("tf_wait_s") < np.inf:
-                raise ValueError(f"tf_wait_s {self._value('tf_wait_s')}: give how long an image waits for its motion, 0 or more")
-            if not 0 <= self._value("max_skew_ms") < np.inf:
-                raise ValueError(f"max_skew_ms {self._value('max_skew_ms')}: give 0 for equal stamps, or how far they may differ")
-            if not self._value("max_depth_sigma") > 0:
-                raise ValueError(f"max_depth_sigma {self._value('max_depth_sigma')}: give the largest sigma of a point's depth as a part of the depth, 0.1 or .inf")
-            names = self._value("point_reasons").replace(",", " ").split()
-            for name in names:
-                if name not in egosgm.REASONS:
-                    raise ValueError(f"point_reasons {name}: give some of {', '.join(egosgm.REASONS)}, or none for all")
-            self._point_reasons = [egosgm.REASONS.index(name) for name in names]
-            if self._value("publish_tf") and self._value("motion_frame"):
-                raise ValueError("publish_tf and motion_frame: a motion that comes from tf is not published there again: unset one of them")
-            egosgm.Pipeline(egosgm.Calibration(100, 100, 32, 32, 0.1), 64, 64, device=self._value("device"), **self._options())
+            self._check_parameters()
             if self._value("publish_tf"):
                 self._broadcaster = tf2_ros().TransformBroadcaster(self)
             if self._value("motion_frame"):  # last: what is made here stays
@@ -317,16 +241,6 @@ class EgosgmNode(LifecycleNode):
             self._tracker, motion = egosgm.ObjectTracker(self._cameras.calibration), None
         return self._tracker.process(grey, maps.disparity, maps.dynamic, motion)
 
-    def _look_at_input(self, images: Any, report: egosgm.FrameReport) -> None:
-        """What is nearer than the range, and what else speaks against the images or their calibration."""
-        options = self._pipeline.options
-        check = egosgm._egosgm._InputCheck(self._cameras.calibration, options["min_disparity"], options["disparities"])
-        check.add(*images, report, True)
-        self._suspicion = check.text().replace("--disparities ", "disparities:=")
-        if self._suspicion and not self._suspicion_told:
-            self.get_logger().warning(self._suspicion)
-            self._suspicion_told = True
-
     def _motion(self, frame_id: str, images: Any, previous: Optional[int], stamp: int) -> Optional[egosgm.Motion]:
         if self._tf is None:
             return self._odometry.process(*images).motion
@@ -375,70 +289,9 @@ class EgosgmNode(LifecycleNode):
         if self._broadcaster:
             self._broadcaster.sendTransform(transform_of(header, self._value("odom_frame"), self._path.world_from_camera))
 
-    def _warn(self, cause: str, text: str) -> None:
-        """At most once a minute for each cause."""
-        now = time.monotonic()
-        if now - self._warned_at.get(cause, -60) >= 60:
-            self._warned_at[cause] = now
-            self.get_logger().warning(text)
-
-    def _tell(self) -> None:
-        now = time.monotonic()
-        rate = (self._count - self._frames_told) / max(1e-3, now - self._told_at)
-        lost = [self._lost_on_the_way, self._replaced]
-        losses = [f"{count - told} {what}" for count, told, what in zip(lost, self._lost_told, (LOST_ON_THE_WAY, REPLACED)) if count > told]
-        self._told_at, self._frames_told, self._lost_told = now, self._count, lost
-        status = DiagnosticStatus(name=f"{self.get_fully_qualified_name()}: stereo", hardware_id="", level=DiagnosticStatus.OK, message="matching")
-        gaps = self._pairing.gaps if hasattr(self, "_pairing") else None
-        if self._problem:
-            status.level, status.message = DiagnosticStatus.ERROR, self._problem
-        elif rate == 0 and self._is_active:
-            text = "no pairs of images"
-            if gaps and gaps.nearest_ms is None and gaps.unpaired_left + gaps.unpaired_right > 0:
-                text += f": {SIDES[gaps.unpaired_left > 0]}/image_rect is silent"
-            elif gaps and gaps.nearest_ms is not None and gaps.nearest_ms > self._value("max_skew_ms"):
-                text += f": the nearest stamps differ by {gaps.nearest_ms:.3f} ms, max_skew_ms is {self._value('max_skew_ms')}"
-            if now - self._waits_since >= 2:
-                self._warn(text.partition("differ")[0], text)
-            status.level, status.message = DiagnosticStatus.WARN, "; ".join([text, *losses])
-        elif not self._is_active:
-            status.message = "not active"
-        elif losses:
-            status.level, status.message = DiagnosticStatus.WARN, "; ".join(losses)
-        elif self._warning:
-            status.level, status.message = DiagnosticStatus.WARN, self._warning
-        elif self._topics_warning or self._suspicion:
-            status.level, status.message = DiagnosticStatus.WARN, self._topics_warning or self._suspicion
-        values = {"rate_hz": f"{rate:.2f}", "frames": str(self._count), "replaced": str(self._replaced), "lost_on_the_way": str(self._lost_on_the_way)}
-        if self._is_active:
-            values["listened_to"] = " ".join(sorted(self._listened_to()))
-        if gaps:
-            values.update(unpaired_left=str(gaps.unpaired_left), unpaired_right=str(gaps.unpaired_right))
-        if self._report:
-            values.update(density=f"{self._report.density:.4f}", search_fraction=f"{min(1.0, self._report.search_fraction):.4f}",
-                          vertical_offset_px=f"{self._report.vertical_offset_px:.3f}", latency_ms=f"{self._latency_ms:.1f}",
-                          device=self._pipeline.device.name)
-        for loss in losses:
-            self._warn(loss.partition(" ")[2], loss)
-        status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
-        message = DiagnosticArray(status=[status])
-        message.header.stamp = self.get_clock().now().to_msg()
-        self._diagnostics.publish(message)
-
-
-def _prepare_process() -> None:
-    """Fast DDS gets shared memory for maps, unless somebody chose what it has. glibc keeps the memory of maps, which come and go with each pair;
-    else the kernel clears it anew each time."""
-    if not any(name in os.environ for name in (*PROFILES_NAMES, "FASTDDS_BUILTIN_TRANSPORTS")):
-        os.environ[PROFILES_NAME] = str(PROFILES)
-    with contextlib.suppress(AttributeError, OSError, TypeError):  # another C library
-        mallopt = ctypes.CDLL(None).mallopt
-        mallopt(-3, 32 << 20)  # M_MMAP_THRESHOLD
-        mallopt(-1, 128 << 20)  # M_TRIM_THRESHOLD
-
 
 def main() -> int:
-    _prepare_process()
+    process.prepare()
     rclpy.init()
     try:
         node = EgosgmNode()
