@@ -126,6 +126,10 @@ class Doctor(InputTest):
         self.assertIn("left image is that of the frame before in 1 of 3 steps", self.assert_only_problem("moments", frozen)["text"])
         said = self.assert_works("run", frozen, "--out", self.new_folder() / "out")
         self.assertIn("the left image is that of the frame before in 1 frame", said)
+        shutil.copy(frozen / "image_1/000001.png", frozen / "image_1/000002.png")
+        found = self.examine(frozen)
+        self.assertEqual((found["moments"]["verdict"], found["rows"]["verdict"]), ("note", "ok"))
+        self.assertIn("both images are those of the frame before in 1 of 3 steps", found["moments"]["text"])
         for late, side in (("right", 0), ("left", 1)):
             street = self.broken_street()
             for i in range(FRAMES - 1):

@@ -173,7 +173,7 @@ def _spread_px(left: Any, right: Any) -> float:
 
 
 def _moments(steps: Sequence[Tuple[_Pair, _Pair]]) -> List[Finding]:
-    """A camera that stands still, or is a frame late."""
+    """A camera that stands still, or is a frame late, or pictures that come again."""
     for this, other in (("left", "right"), ("right", "left")):
         frozen = sum(np.array_equal(getattr(a, this), getattr(b, this)) and not np.array_equal(getattr(a, other), getattr(b, other)) for a, b in steps)
         if frozen:
@@ -186,7 +186,9 @@ def _moments(steps: Sequence[Tuple[_Pair, _Pair]]) -> List[Finding]:
             if spread < min(0.5 * own, _MOST_PAIRED_PX):
                 return [Finding("problem", "moments", f"the {name} images are a frame late: so paired, rows agree within {spread:.2f} px, as they are within {own:.2f} px",
                                 "leave out the first image of that camera, and the last one of the other")]
-    return []
+    repeated = sum(np.array_equal(a.left, b.left) and np.array_equal(a.right, b.right) for a, b in steps)
+    return [Finding("note", "moments", f"both images are those of the frame before in {repeated} of {len(steps)} steps that were looked at",
+                    "leave them out: nothing new is seen in them")] if repeated else []
 
 
 def _motion(calibration: _egosgm.Calibration, steps: Sequence[Tuple[_Pair, _Pair]]) -> List[Finding]:
@@ -232,7 +234,7 @@ def _examine(source: _Source, samples: int, least: int, end: int) -> List[Findin
     if source.rectified:
         of_pairs[0] = of_pairs[0]._replace(text=f"{of_pairs[0].text}, rectified here by {source.rectified}")
     moments = _moments(steps) if of_pairs[0].verdict != "problem" else []
-    if moments or source.is_of_other_moments():  # which explains what rows, sides and range would say
+    if any(finding.verdict == "problem" for finding in moments) or source.is_of_other_moments():  # which explains what rows, sides and range would say
         of_pairs = [finding for finding in of_pairs if finding.check in ("images", "calibration")]
     findings += of_pairs + moments
     is_sound = all(finding.verdict != "problem" for finding in findings)
