@@ -25,8 +25,8 @@ constexpr const char* kNoVideo =
 constexpr const char* kLive = "it names a live camera, which `egosgm live` reads; in Python, egosgm.live.LivePairs";
 
 constexpr const char* kWeb =
-    "it is an address of the web: download what it holds, and unpack it; in Python, egosgm.run takes a generator of a "
-    "live camera's pairs";
+    "it is an address of the network, which nothing here uses: download what it holds; of a live camera, egosgm.run "
+    "in Python takes a generator of pairs";
 
 std::string archive(const char* kind) {
   return std::string("it is ") + kind + ": unpack it, and give the folder that it holds";
@@ -40,8 +40,7 @@ bool is_named_as_video(const fs::path& file) {
 
 bool names_a_camera(const fs::path& path) {
   const std::string text = path.string();
-  return text.find("://") != std::string::npos || text.starts_with("/dev/video") || text.starts_with("/dev/v4l") ||
-         is_digits(text);
+  return text.starts_with("/dev/video") || text.starts_with("/dev/v4l") || is_digits(text);
 }
 
 }  // namespace
@@ -117,8 +116,8 @@ std::string foreign_input(const fs::path& path) {
   const fs::file_status status = fs::status(path, error);
   if (!fs::is_regular_file(status)) {
     const std::string text = path.string();
-    if (text.starts_with("http://") || text.starts_with("https://")) return kWeb;
     if (text.starts_with("file://")) return "it is an address: give the path alone, " + text.substr(7);
+    if (text.find("://") != std::string::npos) return kWeb;
     if (text.starts_with('~')) return "a shell alone knows ~ as the home folder: write its path out";
     if (names_a_camera(path)) return kLive;
     const bool is_pattern = text.find('*') != std::string::npos || text.find("%0") != std::string::npos;

@@ -508,12 +508,14 @@ TEST_F(DatasetTest, WhatIsGivenInPlaceOfAFolderIsNamed) {
   expect_refused([&] { open_folder(root_ / "link"); }, {"link: is a link to what is not there"});
   add_text("HD720.svo2", "x");
   expect_refused([&] { open_folder(root_ / "HD720.svo2"); }, {"recording of a ZED", "ZED_SVO_Export"});
-  for (const char* camera : {"0", "/dev/video77", "rtsp://camera/left"}) {
+  for (const char* camera : {"0", "/dev/video77"}) {
     expect_refused([&] { open_folder(camera); }, {camera, "it names a live camera, which `egosgm live` reads"});
   }
   expect_refused([&] { open_folder("file:///a/drive"); }, {"it is an address: give the path alone, /a/drive"});
   expect_refused([&] { open_folder("~/drive"); }, {"write its path out"});
-  expect_refused([&] { open_folder("https://x.org/drive.zip"); }, {"an address of the web: download"});
+  for (const char* address : {"https://x.org/drive.zip", "rtsp://camera/left"}) {
+    expect_refused([&] { open_folder(address); }, {address, "an address of the network", "takes a generator"});
+  }
   add_images({"single"});
   expect_refused([&] { open_folder(root_ / "single.png"); }, {"give both pictures of a pair"});
   expect_refused([&] { open_folder(root_ / "left/*.png"); }, {"it is a pattern: give --left PATTERN"});

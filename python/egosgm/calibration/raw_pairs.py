@@ -40,6 +40,8 @@ def _refuse(text: str) -> _egosgm.InvalidArgument:
 
 def _expect_file(file: str) -> None:
     """For OpenCV, which would wait for a pipe without an end."""
+    if "://" in file:
+        raise _refuse(f"{file}: is an address, and nothing here uses the network: in Python, egosgm.run takes pairs, as cv2.VideoCapture gives them")
     if not os.path.exists(file):
         raise _refuse(f"{file}: no such file")
     if not os.path.isfile(file):
