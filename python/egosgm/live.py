@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 import urllib.parse
+import warnings
 from typing import Any, Deque, Dict, Iterator, Optional, Sequence, Tuple, Union
 
 from . import _egosgm
@@ -232,6 +233,8 @@ def _options(words: Sequence[str]) -> Any:
         name, is_there, value = word.partition("=")
         if not (name and is_there and value):
             raise _egosgm.InvalidArgument(f"--set {word}: give NAME=VALUE")
+        if name not in _egosgm.pipeline_options() and not name.startswith("constants."):  # run() has names of its own
+            raise _egosgm.InvalidArgument(f"--set {word}: no option of this name: choose from {', '.join(_egosgm.pipeline_options())}")
         options[name.replace(".", "__")] = value
     return options
 
@@ -255,6 +258,8 @@ def main(arguments: Sequence[str]) -> int:
         at_end.callback(viewer.finish if viewer else page.close)
         at_end.callback(lambda: record.finish(pairs.rectifier) if record and record.frames else None)
         at_end.callback(pairs.close)
+        at_end.enter_context(warnings.catch_warnings())
+        warnings.showwarning = lambda message, *_, **__: say(str(message))
         if page:
             tell(f"{page.address} shows it; Ctrl-C ends it")
         is_terminal = sys.stdout is not None and sys.stdout.isatty()

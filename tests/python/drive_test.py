@@ -205,7 +205,7 @@ def test_a_frame_has_its_own_images(street, frames):
 
 def test_without_motion_every_frame_is_searched_whole(street_folder):
     drive = egosgm.run(street_folder, frames="1:2", motion=False, **OPTIONS)
-    reports = [frame.report for frame in drive]
+    reports = [frame.report for frame in egosgm.run(street_folder, frames="1:2", motion=False, device=0, **OPTIONS)]
     assert [report.searched_everything for report in reports] == [True, True] and "no motion" in repr(drive)
 
 

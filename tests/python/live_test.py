@@ -9,6 +9,7 @@ import sys
 import threading
 import urllib.error
 import urllib.request
+import warnings
 
 import numpy as np
 import pytest
@@ -146,6 +147,15 @@ def test_videos_are_matched_shown_and_recorded(is_one, videos, calib, tmp_path, 
     assert len(recorded.frames) == matched
     times = [float(row) for row in (tmp_path / "record/times.txt").read_text().split()]
     assert times == sorted(times) and times[0] >= 0
+
+
+def test_a_warning_is_a_line_of_the_program(cameras, calib, monkeypatch, capsys):
+    def run(*_, **__):
+        warnings.warn("density 5 % in the mean")
+        yield from ()
+    monkeypatch.setattr(live, "run", run)
+    assert run_tool(["live", "--left", "0", "--right", "1", "--calib", calib]) == 0
+    assert capsys.readouterr().err.startswith("egosgm: density 5 % in the mean\n")
 
 
 class Viewer:
@@ -307,6 +317,7 @@ def test_a_port_that_is_in_use_is_refused():
 @pytest.mark.parametrize("words, says", [
     ([], "one input"), (["--left", "0"], "one input"), (["--left", "0", "--right", "0"], "are one camera"), (["--side-by-side", "97"], "no camera that OpenCV can open"),
     (["--side-by-side", "none.mp4"], "no such file"), (["--side-by-side", __file__], "neither an image nor a video"), (["--left", "0", "--right", "1", "--set", "paths"], "NAME=VALUE"),
+    (["--left", "0", "--right", "1", "--set", "device=0"], "--set device=0: no option of this name: choose from preset, "), (["--side-by-side", "rtsp://camera/1"], "is an address"),
     (["--left", "0", "--right", "1", "--record", str(pathlib.Path(__file__).parent)], "--record"), (["--left", "0", "--right", "1", "--port", "99999"], "--port 99999"),
     (["--left", "0", "--right", "1", "--unit", "inch"], "--unit inch"), (["--side-by-side", "/dev/v4l/by-id/none"], "no camera that OpenCV can open")])
 def test_what_is_wrong_is_one_line(words, says, calib, capsys):
