@@ -57,7 +57,7 @@ def parse_arguments():
     parser.add_argument("--ablation", action="store_true", help="every correction on and off, on four kinds of input apart, and nothing else")
     parser.add_argument("--search", metavar="SECONDS", type=float, help="search for better constants for so long, and nothing else")
     parser.add_argument("--constants", metavar="REGEX", default="", help="only these constants of --search, by name: 'banded_sgm', 'EGOSGM_EVIDENCE', ...")
-    parser.add_argument("--sequences", metavar="DIR", nargs="+", help="inputs of --search: recorded sequences with truth, in place of the bench's")
+    parser.add_argument("--sequences", metavar="DIR", nargs="+", type=pathlib.Path, help="inputs of --search: recorded sequences with truth, in place of the bench's")
     parser.add_argument("--seed", type=int, default=1, help="the order in which --search tries constants (1)")
     parser.add_argument("--inputs", metavar="REGEX", default="", help="only these inputs of --ablation and --search, by title")
     parser.add_argument("--paper", action="store_true", help="the paper's table and its figure of a frame's stages, and nothing else")

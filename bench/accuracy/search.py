@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A greedy search for better constants of the method, by the figures of many inputs at once (docs/develop/search.md)."""
 import multiprocessing
+import pathlib
 import random
 import re
 import shutil
@@ -9,7 +10,7 @@ import time
 
 import evidence
 from ablation import FIGURES, Case, cases
-from inputs import PROJECT, STEADY_FROM, Failed, expect
+from inputs import PROJECT, STEADY_FROM, Failed
 
 INPUTS = r"^(2012 / .*|2015 / .*|warehouse|forest|kitchen|street [123](, moving)?)$"
 PLACES = ("sky", "corridor", "fence", "poles")
@@ -88,8 +89,11 @@ def inputs_of(bench, figures, pattern):
 def sequences_of(figures, folders):
     """Recorded sequences of one's own, with truth beside some of their frames."""
     for folder in folders:
-        sequence = figures.egosgm.open_folder(expect(folder))
-        scored = [frame.number for frame in sequence.frames[STEADY_FROM:] if frame.truth_noc]
+        try:
+            sequence = figures.egosgm.open_folder(folder)
+        except figures.egosgm.Error as reason:
+            raise Failed(str(reason)) from None
+        scored = [frame.number for frame in sequence.frames[STEADY_FROM:] if pathlib.Path(frame.truth_noc).is_file()]
         if not scored:
             raise Failed(f"{folder}: no truth from frame {STEADY_FROM} on")
         yield Case("own", str(folder), figures.Recorded(sequence), [frame.number for frame in sequence.frames], scored)

@@ -9,6 +9,7 @@ import pytest
 import egosgm
 
 sys.path[:0] = [str(pathlib.Path(__file__).resolve().parents[2] / folder) for folder in ("bench/accuracy", "bench")]
+import inputs  # noqa: E402
 import search  # noqa: E402
 import video_figures  # noqa: E402
 from ablation import Case  # noqa: E402
@@ -47,6 +48,22 @@ def test_ratios_weigh_figures_and_cells():
     assert search.ratio_to(start, start | {"search": 20.0}) == pytest.approx(1 + search.SEARCH_WEIGHT)
     place = {"wrong_of_all": 1.0, "filled": 50.0, "search": 10.0}
     assert search.ratio_to(place, place | {"wrong_of_all": 3.0, "filled": 25.0}) == pytest.approx((2 + 2) / 2)
+
+
+def test_sequences_of_ones_own_need_truth(tmp_path):
+    with pytest.raises(inputs.Failed, match="no such folder"):
+        list(search.sequences_of(video_figures, [tmp_path / "none"]))
+    for side in ("image_0", "image_1", "truth/left_disp_noc"):
+        (tmp_path / side).mkdir(parents=True)
+    (tmp_path / "calib.txt").write_text("P0: 100 0 32 0 0 100 16 0 0 0 1 0\nP1: 100 0 32 -50 0 100 16 0 0 0 1 0\n")
+    grey = np.random.default_rng(1).integers(0, 65536, (32, 64)).astype(np.float32) / 256
+    for k in range(5):
+        for side in ("image_0", "image_1"):
+            egosgm.write_disparity(tmp_path / side / f"{k:06d}.png", grey)
+    with pytest.raises(inputs.Failed, match="no truth from frame 3 on"):
+        list(search.sequences_of(video_figures, [tmp_path]))
+    egosgm.write_disparity(tmp_path / "truth/left_disp_noc/000004.png", grey)
+    assert [case.scored for case in search.sequences_of(video_figures, [tmp_path])] == [[4]]
 
 
 class Video:
