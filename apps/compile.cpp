@@ -141,7 +141,7 @@ Command add_compile(CLI::App& program) {
   output.add("--clang", arguments->clang, "NAME", "the compiler for --il [clang]");
   output.add("--llvm-spirv", arguments->translator, "NAME", "the translator for --il, of clang's version [llvm-spirv]");
   arguments->method.add_to(*command);
-  add_device(*command, arguments->device);
+  add_device_option(*command, "--device", arguments->device);
   return {command, [arguments] { return compile(*arguments); }};
 }
 

@@ -114,11 +114,11 @@ void RunArguments::add_to(CLI::App& command) {
   method.add_to(command);
   add_motion(command, poses, odometry);
   command.get_option("--poses")->excludes("--pose-topic");
-  add_device(command, device);
-  add_fallback(command, fallback);
-  add_programs(command, programs);
-  add_cache(command, cache);
-  add_tuning(command, tuning);
+  add_device_option(command, "--device", device);
+  add_device_option(command, "--fallback", fallback);
+  add_device_option(command, "--programs", programs);
+  add_device_option(command, "--cache", cache);
+  add_device_option(command, "--tuning", tuning);
 }
 
 SequenceJob RunArguments::job(const Package& package) const {

@@ -236,8 +236,8 @@ Command add_tune(CLI::App& program) {
       ->check(CLI::Range(2, 1000));
   method.add("--stage", arguments->stage, "NAME", "only the sizes of this one; the others stay")
       ->check(CLI::IsMember({"BandedSgm", "ForwardWarp", "SpeckleRemoval", "SearchBand", "VerticalAlignment"}));
-  add_device(*command, arguments->device);
-  add_cache(*command, arguments->cache);
+  add_device_option(*command, "--device", arguments->device);
+  add_device_option(*command, "--cache", arguments->cache);
   return {command, [arguments] { return tune(*arguments); }};
 }
 

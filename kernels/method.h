@@ -34,8 +34,6 @@
 #define EGOSGM_FAR_CONTROL 14
 #define EGOSGM_COARSE_CONTROLS \
   { -19, -14, -10, -7, 7, 10, 14, 19 }
-// Codes may be read so far beside a match.
-#define EGOSGM_CONTROLS_REACH 19
 // Every second row of a block is asked, as the codes of neighbouring rows are alike.
 #define EGOSGM_EVIDENCE_ROW_STEP 2
 // The window, in blocks to all sides; half of a window counts with more than so many pixels in it, a quarter.

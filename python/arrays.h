@@ -5,6 +5,9 @@
 #include <pybind11/numpy.h>
 
 #include <Eigen/Geometry>
+#include <array>
+#include <initializer_list>
+#include <utility>
 #include <vector>
 
 #include "egosgm/image.h"
@@ -46,5 +49,22 @@ py::array_t<double> array_of(const Eigen::Isometry3d& transform);
 /// An (N, 4, 4) array.
 std::vector<Eigen::Isometry3d> transforms_of(const py::object& matrices, const char* name);
 py::array_t<double> array_of(const std::vector<Eigen::Isometry3d>& transforms);
+
+inline std::array<double, 3> values_of(const Eigen::Vector3d& vector) { return {vector.x(), vector.y(), vector.z()}; }
+
+/// [left, top, right, bottom] of an object's pixels.
+template <typename Object>
+std::array<int, 4> box_of(const Object& object) {
+  return {object.left, object.top, object.right, object.bottom};
+}
+
+/// Makes a property of each of a class's images.
+template <typename Value>
+void bind_images(py::class_<Value>& bound,
+                 std::initializer_list<std::pair<const char*, vision::Image Value::*>> images) {
+  for (const auto& [name, member] : images) {
+    bound.def_property_readonly(name, [member = member](const Value& value) { return array_of(value.*member); });
+  }
+}
 
 }  // namespace egosgm::python

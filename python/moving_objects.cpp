@@ -4,7 +4,6 @@
 #include <pybind11/eigen.h>
 #include <pybind11/stl.h>
 
-#include <array>
 #include <mutex>
 
 #include "python/arrays.h"
@@ -44,8 +43,6 @@ class LockedTracker {
   ObjectTracker tracker_;
 };
 
-std::array<double, 3> values_of(const Eigen::Vector3d& vector) { return {vector.x(), vector.y(), vector.z()}; }
-
 }  // namespace
 
 void bind_moving_objects(py::module_& module) {
@@ -53,12 +50,8 @@ void bind_moving_objects(py::module_& module) {
       .def_readonly("id", &MovingObject::id, "1 to 255; kept while each frame finds the object.")
       .def_readonly("age", &MovingObject::age, "Pairs of frames that found it, one after the other.")
       .def_readonly("pixels", &MovingObject::pixels, "That have its label.")
-      .def_property_readonly(
-          "box",
-          [](const MovingObject& o) {
-            return std::array{o.left, o.top, o.right, o.bottom};
-          },
-          "[left, top, right, bottom] of its pixels, all four within it.")
+      .def_property_readonly("box", &box_of<MovingObject>,
+                             "[left, top, right, bottom] of its pixels, all four within it.")
       .def_property_readonly(
           "centre_m", [](const MovingObject& o) { return values_of(o.centre_m); },
           "Of its visible surface, in the camera's frame.")
@@ -86,13 +79,10 @@ void bind_moving_objects(py::module_& module) {
   auto scene_flow = py::class_<SceneFlow>(
       module, "SceneFlow",
       "Where the pixels of the frame before the newest one lie in the newest one, at that frame's pixels.");
-  const std::pair<const char*, vision::Image SceneFlow::*> maps[] = {{"disparity", &SceneFlow::disparity},
-                                                                     {"next_disparity", &SceneFlow::next_disparity},
-                                                                     {"flow", &SceneFlow::flow},
-                                                                     {"labels", &SceneFlow::labels}};
-  for (const auto& [name, member] : maps) {
-    scene_flow.def_property_readonly(name, [member = member](const SceneFlow& f) { return array_of(f.*member); });
-  }
+  bind_images(scene_flow, {{"disparity", &SceneFlow::disparity},
+                           {"next_disparity", &SceneFlow::next_disparity},
+                           {"flow", &SceneFlow::flow},
+                           {"labels", &SceneFlow::labels}});
   scene_flow.def_readonly("moving", &SceneFlow::moving, "With boxes, centres and velocities in the earlier frame.")
       .def_readonly("camera", &SceneFlow::camera, "The camera's motion from the earlier frame to the newest one.");
 

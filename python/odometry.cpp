@@ -3,7 +3,6 @@
 
 #include <pybind11/stl.h>
 
-#include <array>
 #include <mutex>
 
 #include "egosgm/vision/synthetic.h"
@@ -99,40 +98,25 @@ class LockedOdometry {
 
 void bind_synthetic(py::module_& module) {
   auto frame = py::class_<SyntheticFrame>(module, "SyntheticFrame", "Images, exact disparities [px] and masks.");
-  const std::pair<const char*, vision::Image SyntheticFrame::*> maps[] = {
-      {"left", &SyntheticFrame::left},
-      {"right", &SyntheticFrame::right},
-      {"left_disparity", &SyntheticFrame::left_disparity},
-      {"right_disparity", &SyntheticFrame::right_disparity},
-      {"left_noc", &SyntheticFrame::left_noc},
-      {"right_noc", &SyntheticFrame::right_noc},
-      {"left_moving", &SyntheticFrame::left_moving},
-      {"right_moving", &SyntheticFrame::right_moving}};
-  for (const auto& [name, member] : maps) {
-    frame.def_property_readonly(name, [member = member](const SyntheticFrame& f) { return array_of(f.*member); });
-  }
+  bind_images(frame, {{"left", &SyntheticFrame::left},
+                      {"right", &SyntheticFrame::right},
+                      {"left_disparity", &SyntheticFrame::left_disparity},
+                      {"right_disparity", &SyntheticFrame::right_disparity},
+                      {"left_noc", &SyntheticFrame::left_noc},
+                      {"right_noc", &SyntheticFrame::right_noc},
+                      {"left_moving", &SyntheticFrame::left_moving},
+                      {"right_moving", &SyntheticFrame::right_moving}});
   frame.def_property_readonly("world_from_camera",
                               [](const SyntheticFrame& f) { return array_of(f.world_from_camera); });
 
   py::class_<SyntheticObject>(module, "SyntheticObject", "What moves by itself and shows in a left image.")
       .def_readonly("id", &SyntheticObject::id, "Its pixels in SyntheticSceneFlow.objects.")
+      .def_property_readonly("box", &box_of<SyntheticObject>,
+                             "[left, top, right, bottom] of its pixels, all four within it.")
       .def_property_readonly(
-          "box",
-          [](const SyntheticObject& o) {
-            return std::array{o.left, o.top, o.right, o.bottom};
-          },
-          "[left, top, right, bottom] of its pixels, all four within it.")
+          "centre_m", [](const SyntheticObject& o) { return values_of(o.centre_m); }, "In the camera's frame.")
       .def_property_readonly(
-          "centre_m",
-          [](const SyntheticObject& o) {
-            return std::array{o.centre_m.x(), o.centre_m.y(), o.centre_m.z()};
-          },
-          "In the camera's frame.")
-      .def_property_readonly(
-          "velocity_m",
-          [](const SyntheticObject& o) {
-            return std::array{o.velocity_m.x(), o.velocity_m.y(), o.velocity_m.z()};
-          },
+          "velocity_m", [](const SyntheticObject& o) { return values_of(o.velocity_m); },
           "Its own, without the camera's, per frame, in the camera's frame.")
       .def_property_readonly(
           "next_from_current", [](const SyntheticObject& o) { return array_of(o.next_from_current); },
@@ -140,15 +124,10 @@ void bind_synthetic(py::module_& module) {
 
   auto scene_flow = py::class_<SyntheticSceneFlow>(
       module, "SyntheticSceneFlow", "Where the surfaces of a left image are one frame later, hidden ones too.");
-  const std::pair<const char*, vision::Image SyntheticSceneFlow::*> flow_maps[] = {
-      {"flow", &SyntheticSceneFlow::flow},
-      {"next_disparity", &SyntheticSceneFlow::next_disparity},
-      {"seen_next", &SyntheticSceneFlow::seen_next},
-      {"objects", &SyntheticSceneFlow::objects}};
-  for (const auto& [name, member] : flow_maps) {
-    scene_flow.def_property_readonly(name,
-                                     [member = member](const SyntheticSceneFlow& f) { return array_of(f.*member); });
-  }
+  bind_images(scene_flow, {{"flow", &SyntheticSceneFlow::flow},
+                           {"next_disparity", &SyntheticSceneFlow::next_disparity},
+                           {"seen_next", &SyntheticSceneFlow::seen_next},
+                           {"objects", &SyntheticSceneFlow::objects}});
   scene_flow.def_readonly("moving", &SyntheticSceneFlow::moving, "The objects with flow, by id.");
 
   py::class_<SyntheticSequence>(module, "SyntheticSequence",

@@ -9,34 +9,16 @@ from numpy.typing import ArrayLike, NDArray
 from typing_extensions import Unpack
 
 from ._options import FrameMaps, PipelineOptions, StereoOdometryOptions, SyntheticOptions
-from .calibration.reader import read_calibration as read_calibration
-from .calibration.reader import read_euroc_rig as read_euroc_rig
-from .calibration.reader import read_opencv_rig as read_opencv_rig
+from .calibration.reader import read_calibration as read_calibration, read_euroc_rig as read_euroc_rig, read_opencv_rig as read_opencv_rig
 from .geometry.depth import depth_sigma_from_disparity as depth_sigma_from_disparity
-from .drive import StereoVideo as StereoVideo
-from .drive import VideoFrame as VideoFrame
-from .drive import run as run
+from .drive import StereoVideo as StereoVideo, VideoFrame as VideoFrame, run as run
 from .diagnostics.examination import match_pair as match_pair
 from .matcher import Matcher as Matcher
-from .geometry.points import PointCloud as PointCloud
-from .geometry.points import point_cloud as point_cloud
-from .geometry.points import write_ply as write_ply
-from .evaluation.flow_evaluation import ObjectCounts as ObjectCounts
-from .evaluation.flow_evaluation import OutlierFigures as OutlierFigures
-from .evaluation.flow_evaluation import SceneFlowEvaluation as SceneFlowEvaluation
-from .evaluation.flow_evaluation import SceneFlowFigures as SceneFlowFigures
-from .evaluation.flow_evaluation import evaluate_scene_flow as evaluate_scene_flow
-from .evaluation.pose_evaluation import MotionError as MotionError
-from .evaluation.pose_evaluation import PoseEvaluation as PoseEvaluation
-from .evaluation.pose_evaluation import SegmentError as SegmentError
-from .evaluation.pose_evaluation import evaluate_poses as evaluate_poses
-from .calibration.rectification import Rectification as Rectification
-from .calibration.rectification import StereoRig as StereoRig
-from .evaluation.video_evaluation import DensityFigures as DensityFigures
-from .evaluation.video_evaluation import RegionFigures as RegionFigures
-from .evaluation.video_evaluation import VideoEvaluation as VideoEvaluation
-from .evaluation.video_evaluation import VideoFigures as VideoFigures
-from .evaluation.video_evaluation import evaluate_video as evaluate_video
+from .geometry.points import PointCloud as PointCloud, point_cloud as point_cloud, write_ply as write_ply
+from .evaluation.flow_evaluation import ObjectCounts as ObjectCounts, OutlierFigures as OutlierFigures, SceneFlowEvaluation as SceneFlowEvaluation, SceneFlowFigures as SceneFlowFigures, evaluate_scene_flow as evaluate_scene_flow
+from .evaluation.pose_evaluation import MotionError as MotionError, PoseEvaluation as PoseEvaluation, SegmentError as SegmentError, evaluate_poses as evaluate_poses
+from .calibration.rectification import Rectification as Rectification, StereoRig as StereoRig
+from .evaluation.video_evaluation import DensityFigures as DensityFigures, RegionFigures as RegionFigures, VideoEvaluation as VideoEvaluation, VideoFigures as VideoFigures, evaluate_video as evaluate_video
 from .evaluation.video_counts import move_map as move_map
 
 __version__: str

@@ -17,7 +17,6 @@ inline constexpr int kEvidenceOfChoice = 48;
 inline constexpr int kEvidenceOfNoise = 24;
 inline constexpr int kMostEvidence = 160;
 inline constexpr int kTrustedEvidence = 96;
-inline constexpr float kDifferencePx = 1.0f;
 inline constexpr int kDynamicAgrees = 24;
 inline constexpr float kDynamicAlikePart = 0.03f;
 inline constexpr float kDynamicAlikePx = 1.0f;
