@@ -22,6 +22,7 @@ constexpr double kUsualBaseline_m[] = {0.02, 1.0};
 constexpr double kMinFocal = 0.15, kMaxFocal = 30;  // of the width
 // Of the sides, from the middle: 35 real sequences lie within 0.1. One that is scaled by itself moves both coordinates.
 constexpr double kMaxOffMiddle = 0.2, kMaxOffBoth = 0.1;
+constexpr double kMaxStretch = 1.15;  // of one focal length by the other, where the principal point is off, too
 constexpr double kMinDensity = 0.5;
 constexpr double kFarRows_px = 0.9 * EGOSGM_MAX_OFFSET_PX;
 constexpr std::size_t kFramesPerLook = 50;  // for what is nearer than the range
@@ -103,7 +104,9 @@ std::optional<Suspicion> suspect_calibration(const Calibration& c, Size size) {
         "turn them back, as only so do the cameras stand side by side; exchange cx and cy where they stand upright"};
   }
   const bool is_far = !is_within(x, kMaxOffMiddle) || !is_within(y, kMaxOffMiddle);
-  const bool is_scaled = is_off && (x > 0.5) == (y > 0.5);
+  const double least = std::min(c.fx, c.fy), largest = std::max(c.fx, c.fy);
+  const bool is_stretched = largest > kMaxStretch * least && (!is_within(x, kMaxOffBoth) || !is_within(y, kMaxOffBoth));
+  const bool is_scaled = (is_off && (x > 0.5) == (y > 0.5)) || is_stretched;
   if (is_far || is_scaled) {
     return Suspicion{
         "the principal point is far from the middle of " + of_size + formatted(" (cx %.1f, cy %.1f)", c.cx, c.cy),
@@ -115,7 +118,6 @@ std::optional<Suspicion> suspect_calibration(const Calibration& c, Size size) {
                          of_size,
                      "give the right image's cx less the left one's as doffs_px"};
   }
-  const double least = std::min(c.fx, c.fy), largest = std::max(c.fx, c.fy);
   if (least < kMinFocal * size.width || largest > kMaxFocal * size.width || largest > 2 * least) {
     return Suspicion{formatted("focal lengths of %.4g and %.4g px in images of ", c.fx, c.fy) + of_size, remedy};
   }

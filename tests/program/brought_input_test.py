@@ -108,6 +108,8 @@ class Doubts(Brought):
             self.assertEqual("the principal point is far from the middle" in said, is_told, factor)
             finding = next(one for one in json.loads(self.run_doctor(*arguments, "--json").stdout) if one["check"] == "calibration")
             self.assertEqual("the principal point is far from the middle" in finding["text"], is_told, factor)
+        wide = self.with_calibration(self.calibrated(fx=1.3 * f, cx=1.3 * cx, fy=f, cy=cy))  # scaled as images were whose height stayed
+        self.assertIn("the principal point is far from the middle", self.assert_works("run", *wide, "--frames", 0, "--out", self.new_folder() / "out"))
         k = f"[{f} 0 {cx}; 0 {f} {cy}; 0 0 1]"
         p = f"{f} 0 {cx} 0 0 {f} {cy} 0 0 0 1 0"
         for text in (f"cam0={k}\ncam1={k}\nbaseline={1000 * baseline}\nwidth={2 * WIDTH}\nheight={2 * HEIGHT}\n",
