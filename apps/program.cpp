@@ -61,8 +61,9 @@ int refuse_arguments(const CLI::App& program, const CLI::ParseError& error) {
   const std::string typed = unknown.front().substr(0, unknown.front().find('='));
   if (typed == "view") {
     return fail(kBadInput,
-                "view: the Python package shows frames: pip install the wheel, with \"[rerun]\", and see egosgm.viewer "
-                "(docs/use/python.md); `egosgm run --write overview` draws them into files");
+                "view: `egosgm run --show` of the Python package shows a run in the browser, its egosgm.viewer in "
+                "Rerun; `egosgm "
+                "run --write overview` draws it into files");
   }
   const char* const what = typed.starts_with("-") ? "unknown option"
                            : command.get_parent() ? "unexpected argument"

@@ -89,7 +89,7 @@ Contents multiview(const fs::path& folder) {
     const std::set<std::string> scenes = scenes_in(candidate);
     if (scenes.empty()) continue;
     return "it holds KITTI's multi-view scenes " + *scenes.begin() +
-           (scenes.size() > 1 ? ".." + *scenes.rbegin() : "") + ": use --kitti " + candidate.string() + " --scene " +
+           (scenes.size() > 1 ? ".." + *scenes.rbegin() : "") + ": use --kitti '" + candidate.string() + "' --scene " +
            *scenes.begin();
   }
   return std::nullopt;
@@ -169,6 +169,7 @@ Contents folders_of_images(const fs::path& folder) {
 
 /// The folder of one camera's images.
 Contents one_camera(const fs::path& folder) {
+  if (!holds_images(folder) && !holds_images(folder / "data")) return std::nullopt;
   std::error_code error;
   const fs::path absolute = fs::canonical(folder, error);
   for (const fs::path& above : {absolute.parent_path(), absolute.parent_path().parent_path()}) {
@@ -185,14 +186,14 @@ Contents one_camera(const fs::path& folder) {
 Contents two_cameras(const fs::path& folder) {
   const std::optional<TwoCameras> cameras = find_two_cameras(folder);
   if (!cameras) return std::nullopt;
-  return "it holds two cameras and no calib.txt: put their calibration there, or give " + folder.string() +
-         " --calib '" + foreign_calibration(folder, *cameras).string() + "'";
+  return "it holds two cameras and no calib.txt: put their calibration there, or give '" + folder.string() +
+         "' --calib '" + foreign_calibration(folder, *cameras).string() + "'";
 }
 
 Contents euroc(const fs::path& folder) {
   for (const fs::path& candidate : {folder, folder / "mav0"}) {
     if (is_file(candidate / "cam0/data.csv"))
-      return "it is an EuRoC recording: egosgm rectify --euroc " + folder.string() + " makes a sequence of it";
+      return "it is an EuRoC recording: egosgm rectify --euroc '" + folder.string() + "' makes a sequence of it";
   }
   return std::nullopt;
 }

@@ -48,7 +48,7 @@ class Help(ProgramTest):
         self.assertNotRegex(loaded, "opencv_(highgui|imgcodecs|videoio)")
 
     def test_what_the_python_package_has_is_named(self):
-        self.assert_refused(["view", self.street], "the Python package", "[rerun]", "--write overview")
+        self.assert_refused(["view", self.street], "the Python package", "run --show", "--write overview")
 
     def test_a_tool_in_python_names_the_package_where_it_is_not_there(self):
         """By a copy of the program, beside which there is none."""

@@ -346,7 +346,7 @@ TEST_F(DatasetTest, AFolderOfAnotherLevelIsNamedWithWhatItHolds) {
   }
   for (const char* folder : {"kitti", "kitti/training"}) {
     expect_refused([&] { open_folder(root_ / folder); },
-                   {"000003..000007", "--kitti", "kitti/training --scene 000003"});
+                   {"000003..000007", "--kitti", "kitti/training' --scene 000003"});
   }
   expect_refused([&] { open_kitti_odometry(root_ / "kitti/training"); }, {"holds no images", "--kitti"});
   for (const char* name : {"odo/sequences/00/image_0/000000", "odo/sequences/00/image_1/000000"}) add_images({name});
@@ -356,9 +356,11 @@ TEST_F(DatasetTest, AFolderOfAnotherLevelIsNamedWithWhatItHolds) {
   expect_refused([&] { open_folder(root_ / "odo/sequences/00/image_1"); }, {"belongs to the sequence", "sequences/00"});
   add_images({"own/left/1", "own/right/1"}), add_text("rec/mav0/cam0/data.csv", "x"), add_text("out/report.json", "{}");
   expect_refused([&] { open_folder(root_ / "own/left"); }, {"it belongs to the sequence", "/own: give that one"});
+  add_text("own/scans/left/0.jfif", "\xff\xd8\xff"), add_text("own/scans/right/0.jfif", "\xff\xd8\xff");
+  expect_refused([&] { open_folder(root_ / "own/scans"); }, {"left/0.jfif: it is a PNG or JPEG under another name"});
   add_images({"alone/0/1"});
   expect_refused([&] { open_folder(root_ / "alone/0"); }, {"images of its own"});
-  expect_refused([&] { open_folder(root_ / "rec"); }, {"egosgm rectify --euroc"});
+  expect_refused([&] { open_folder(root_ / "rec"); }, {"egosgm rectify --euroc '"});
   expect_refused([&] { open_folder(root_ / "out"); }, {"egosgm run"});
   expect_refused([&] { open_folder(root_ / "own/left/1.png"); },
                  {"is no folder", "LEFT RIGHT", "--left PATTERN", "quotes"});
@@ -394,10 +396,10 @@ TEST_F(DatasetTest, TwoFoldersOfImagesAndTheirCalibrationAreASequence) {
   EXPECT_FALSE(open_folder(root_ / "e").has_calibration);
   add_text("e/rig.json", "{}");
   expect_refused([&] { open_folder(root_ / "e"); },
-                 {"no calib.txt: put their calibration there", "/e --calib '" + path("e/rig.json") + "'"});
+                 {"no calib.txt: put their calibration there", "/e' --calib '" + path("e/rig.json") + "'"});
   std::filesystem::remove(root_ / "e/rig.json");
   add_text("e/left.yaml", "a: 1"), add_text("e/right.yaml", "a: 1");
-  expect_refused([&] { open_folder(root_ / "e"); }, {"/e --calib '" + path("e/left.yaml") + "'"});
+  expect_refused([&] { open_folder(root_ / "e"); }, {"/e' --calib '" + path("e/left.yaml") + "'"});
   add_text("e/others.json", "{}");
   EXPECT_FALSE(open_folder(root_ / "e").has_calibration);
   add_images({"g/cam_Left/1", "g/cam_Right/1", "h/L/1", "h/R/1"});
