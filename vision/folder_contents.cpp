@@ -169,7 +169,7 @@ Contents folders_of_images(const fs::path& folder) {
 
 /// The folder of one camera's images.
 Contents one_camera(const fs::path& folder) {
-  if (!holds_images(folder) && !holds_images(folder / "data")) return std::nullopt;
+  if (holds_both(folder, "left", "right") || holds_both(folder, "cam0", "cam1")) return std::nullopt;
   std::error_code error;
   const fs::path absolute = fs::canonical(folder, error);
   for (const fs::path& above : {absolute.parent_path(), absolute.parent_path().parent_path()}) {
