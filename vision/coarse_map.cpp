@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <limits>
 #include <utility>
 #include <vector>
 
 #include "vision/grey_bytes.h"
+#include "vision/no_value.h"
 #include "vision/wide_matching.h"
 
 namespace egosgm::vision {
@@ -18,7 +18,6 @@ constexpr double kClippedShare = 0.01;  // of the points
 constexpr int kLeastSlope = 24;         // of grey levels; where rows are smoother, nothing is sure
 constexpr int kCoarseSide = 256;        // images are made smaller, down to this
 constexpr double kFewest = 0.03;        // of the pixels; below, the map says nothing
-constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
 
 /// The mean difference [grey levels] of the block around (x, y) and the one `d` to the left in the other image.
 double block_difference(const Image& left, const Image& right, int x, int y, int d) {
@@ -62,7 +61,7 @@ int slope_at(const Image& image, int x, int y) {
 Image coarse_map_of(const Image& left, const Image& right, double row_offset_px, int least, int end) {
   const int factor = std::max(1, (std::max(left.cols, left.rows) + kCoarseSide - 1) / kCoarseSide);
   const Size size(left.cols / factor, left.rows / factor);
-  Image map(std::max(size.height, 0), std::max(size.width, 0), kF32, kNothing);
+  Image map(std::max(size.height, 0), std::max(size.width, 0), kF32, kNoValue);
   if (size.width < 32 || size.height < 16) return map;
   const int half = (size.width / 2 + 15) / 16 * 16;
   const Image small[2] = {shrunk_grey(left, factor, 0), shrunk_grey(right, factor, row_offset_px)};
@@ -70,7 +69,7 @@ Image coarse_map_of(const Image& left, const Image& right, double row_offset_px,
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
       const float d = found.at<float>(y, x);
-      const bool is_sure = !std::isnan(d) && std::abs(slope_at(small[0], x, y)) >= kLeastSlope;
+      const bool is_sure = has_value(d) && std::abs(slope_at(small[0], x, y)) >= kLeastSlope;
       if (!is_sure || x - d < 0 || x - d >= static_cast<float>(size.width)) continue;
       const float full = d * static_cast<float>(factor);
       const bool is_outside = full < static_cast<float>(least) - 1 || full > static_cast<float>(end);

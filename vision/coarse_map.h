@@ -8,7 +8,7 @@
 
 namespace egosgm::vision {
 
-/// Disparities [px, of the images' own size] of images made smaller, sought from minus to plus half the width; NaN
+/// Disparities [px, of the images' own size] of images made smaller, sought from minus to plus half the width; kNoValue
 /// where nothing is sure. One outside of [least, end), the range that is to be searched, counts only where none in it
 /// explains the images nearly as well, as where texture repeats. The right image's rows lie row_offset_px further
 /// down. REQUIRES: images of one size, both kU8 or both kU16. Thread-safe.

@@ -8,6 +8,7 @@
 
 #include "egosgm/error.h"
 #include "host/odometry/geometry.h"
+#include "vision/no_value.h"
 #include "vision/pixel_group.h"
 #include "vision/pixel_motion.h"
 #include "vision/rigid_alignment.h"
@@ -256,11 +257,11 @@ std::vector<SurfacePoint> ObjectTracker::State::points_of(const Group& group) co
   return points;
 }
 
-/// By how much the last frame contradicts that the surface at a pixel came from `seen`. NaN: it says nothing.
+/// By how much the last frame contradicts that the surface at a pixel came from `seen`. kNoValue: it says nothing.
 float ObjectTracker::State::cost_of(const Pixel& p, float u_seen, float v_seen, float d_seen) const {
   const float u0 = std::floor(u_seen), v0 = std::floor(v_seen);
   if (!(u0 >= 0 && v0 >= 0 && u0 + 1 < static_cast<float>(size.width) && v0 + 1 < static_cast<float>(size.height))) {
-    return NAN;
+    return kNoValue;
   }
   const int u = static_cast<int>(u0), v = static_cast<int>(v0);
   const float s = u_seen - u0, t = v_seen - v0;
@@ -276,7 +277,7 @@ float ObjectTracker::State::cost_of(const Pixel& p, float u_seen, float v_seen, 
 
 /// That of the pixels of a box that have a disparity, if they came from where `back` leads.
 BoxValues ObjectTracker::State::costs(const Box& box, const BoxValues& disparities, const PixelMotion& back) const {
-  BoxValues of_pixels(box.area(), NAN);
+  BoxValues of_pixels(box.area(), kNoValue);
   MovedRow seen;
   for (int y = box.top; y < box.bottom; ++y) {
     back.of_row(box.left, y, &disparities[box.index(box.left, y)], box.width(), seen);
@@ -300,7 +301,7 @@ bool ObjectTracker::State::label(Candidate& candidate) const {
   const double low = quantile(0.06), high = quantile(0.94);
   const double least = low - 0.5 * alike_px(low), most = high + 0.5 * alike_px(high);
   const Box box = candidate.group.box.padded(candidate.is_new() ? kNewPad_px : kKnownPad_px, size);
-  BoxValues near(box.area(), NAN);  // disparities as those of the group
+  BoxValues near(box.area(), kNoValue);  // disparities as those of the group
   for (int y = box.top; y < box.bottom; ++y) {
     for (int x = box.left; x < box.right; ++x) {
       const double d = disparity({x, y});
@@ -339,7 +340,7 @@ bool ObjectTracker::State::label(Candidate& candidate) const {
   int asked = 0;
   for (const Pixel& p : candidate.label.pixels) {
     const float each = by_own[box.index(p.x, p.y)];
-    if (std::isnan(each)) continue;
+    if (!has_value(each)) continue;
     cost += each;
     ++asked;
   }
@@ -417,8 +418,8 @@ bool ObjectTracker::State::absorb(const Group& group, std::vector<Candidate>& fo
       const auto seen = moved(by_object, p);
       const float there =
           seen ? cost_of(p, static_cast<float>(seen->x()), static_cast<float>(seen->y()), static_cast<float>(seen->z()))
-               : NAN;
-      return std::isnan(there) || there == kHiddenCost;
+               : kNoValue;
+      return !has_value(there) || there == kHiddenCost;
     });
     if (hidden < 0.5) continue;
     for (const Pixel& p : group.pixels) object.label.add(p.x, p.y);
@@ -572,7 +573,7 @@ SceneFlow ObjectTracker::State::scene_flow() const {
     float* flow = result.flow.row<float>(y) + 2 * x;
     flow[0] = u - static_cast<float>(x);
     flow[1] = v - static_cast<float>(y);
-    result.next_disparity.at<float>(y, x) = std::isnan(d) ? kInvalidDisparity : d;
+    result.next_disparity.at<float>(y, x) = has_value(d) ? d : kInvalidDisparity;
   };
   MovedRow there;
   for (int y = 0; y < size.height; ++y) {

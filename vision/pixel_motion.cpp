@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "vision/pixel_motion.h"
 
-#include <cmath>
-
 #include "host/cpu_clones.h"
+#include "vision/no_value.h"
 
 namespace egosgm::vision {
 namespace {
@@ -19,7 +18,7 @@ void move_row(const double* m, int x, int v, const float* d, int count, Pointers
   for (int i = 0; i < count; ++i) {
     const double u = x + i, disparity = d[i];
     const double w = m[12] * u + of_v[3] + m[14] * disparity;
-    const double scale = w > kMinDepthRatio ? 1 / w : NAN;
+    const double scale = w > kMinDepthRatio ? 1 / w : kNoValue;
     to.u[i] = static_cast<float>((m[0] * u + of_v[0] + m[2] * disparity) * scale);
     to.v[i] = static_cast<float>((m[4] * u + of_v[1] + m[6] * disparity) * scale);
     to.d[i] = static_cast<float>((m[8] * u + of_v[2] + m[10] * disparity) * scale);

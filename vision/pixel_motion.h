@@ -39,7 +39,7 @@ class PixelMotion {
     return there.head<3>() / there.w();
   }
 
-  /// The same of `count` pixels x, x + 1, ... of row v, whose disparities are `d`, in floats. NaN: none.
+  /// The same of `count` pixels x, x + 1, ... of row v, whose disparities are `d`, in floats. kNoValue: none.
   void of_row(int x, int v, const float* d, int count, MovedRow& there) const;
 
  private:

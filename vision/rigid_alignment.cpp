@@ -10,6 +10,7 @@
 #include "host/cpu_clones.h"
 #include "host/odometry/geometry.h"
 #include "vision/image_values.h"
+#include "vision/no_value.h"
 
 namespace egosgm::vision {
 namespace {
@@ -179,7 +180,7 @@ std::optional<RigidFit> align_rigidly(const Calibration& calibration, const Alig
     const std::size_t step = std::size_t{1} << level;  // fewer points where pixels are large
     for (std::size_t i = 0; i < points.size(); i += step) {
       const auto grey = sample(from.greys[level], at_level(points[i].u, level), at_level(points[i].v, level));
-      greys[i] = grey ? grey->value : NAN;
+      greys[i] = grey ? grey->value : kNoValue;
     }
     for (int round = 0; round < kRounds; ++round) {
       fit.centre_m = fit.motion * middle;
@@ -187,7 +188,7 @@ std::optional<RigidFit> align_rigidly(const Calibration& calibration, const Alig
       std::size_t asked = 0, agree = 0;
       for (std::size_t i = 0; i < points.size(); i += step) {
         const Eigen::Vector3d moved = fit.motion * points[i].point_m;
-        if (!(moved.z() > odometry::kMinDepth_m) || std::isnan(greys[i])) continue;
+        if (!(moved.z() > odometry::kMinDepth_m) || !has_value(greys[i])) continue;
         const Eigen::Vector3d seen = odometry::project(calibration, moved);
         const Eigen::Matrix3d by_point = odometry::projection_jacobian(calibration, moved);
         const Eigen::Vector3d arm = moved - fit.centre_m;

@@ -11,6 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include "vision/no_value.h"
+
 namespace egosgm::vision {
 namespace {
 
@@ -20,7 +22,6 @@ constexpr int kSmall = 6, kLarge = 24, kLargest = 48;  // costs: of a step by 1,
 constexpr double kUnique = 1.05;                       // the second best cost by the best one's
 constexpr int kMostDifference = 1;                     // between the views [px]
 constexpr std::size_t kLeastPatch = 40;                // pixels; less is a speckle
-constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
 
 using Codes = std::vector<std::uint64_t>;
 using Costs = std::vector<std::uint16_t>;  // of each pixel, the disparities side by side
@@ -76,7 +77,7 @@ class Matching {
 
   /// The map of pixels whose best disparity is unique, and the right view's too.
   Image map() const {
-    Image map(height_, width_, kF32, kNothing);
+    Image map(height_, width_, kF32, kNoValue);
     for (int y = 0; y < height_; ++y) {
       for (int x = 0; x < width_; ++x) {
         const std::uint16_t* sums = &sums_[at(x, y)];
@@ -151,7 +152,7 @@ void drop_speckles(Image& map) {
   std::vector<Pixel> patch;
   for (int y = 0; y < map.rows; ++y) {
     for (int x = 0; x < map.cols; ++x) {
-      if (seen.at<std::uint8_t>(y, x) || std::isnan(map.at<float>(y, x))) continue;
+      if (seen.at<std::uint8_t>(y, x) || !has_value(map.at<float>(y, x))) continue;
       patch.assign(1, {x, y});
       seen.at<std::uint8_t>(y, x) = 1;
       for (std::size_t i = 0; i < patch.size(); ++i) {
@@ -166,7 +167,7 @@ void drop_speckles(Image& map) {
         }
       }
       if (patch.size() >= kLeastPatch) continue;
-      for (const Pixel pixel : patch) map.at<float>(pixel.y, pixel.x) = kNothing;
+      for (const Pixel pixel : patch) map.at<float>(pixel.y, pixel.x) = kNoValue;
     }
   }
 }

@@ -5,13 +5,14 @@
 #include <cmath>
 
 #include "host/cpu_clones.h"
+#include "vision/no_value.h"
 
 namespace egosgm::vision {
 namespace {
 
 constexpr int kRadius_px = 4, kStep_px = 2, kMinCount = 3;
 
-/// Adds what alike neighbours say. `neighbours`: their disparities, NaN where they have no value.
+/// Adds what alike neighbours say. `neighbours`: their disparities, kNoValue where they have no value.
 EGOSGM_CPU_CLONES
 void add_alike(const float* disparities, const float* tolerances, const float* neighbours, const float* values,
                int count, float* __restrict sums, float* __restrict counts) {
@@ -30,7 +31,7 @@ BoxValues means_of_alike(const Box& box, const BoxValues& disparities, const Box
   BoxValues tolerances(box.area()), neighbours(box.area()), means(box.area(), 0);
   for (std::size_t i = 0; i < box.area(); ++i) {
     tolerances[i] = static_cast<float>(alike_px(disparities[i]));
-    neighbours[i] = std::isnan(values[i]) ? NAN : disparities[i];
+    neighbours[i] = has_value(values[i]) ? disparities[i] : kNoValue;
   }
   std::vector<float> sums, counts;
   for (int y = 0; y < box.height(); ++y) {

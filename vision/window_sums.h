@@ -7,7 +7,7 @@
 
 namespace egosgm::vision {
 
-/// Values of the pixels of a box, row by row. NaN: none.
+/// Values of the pixels of a box, row by row. kNoValue: none.
 using BoxValues = std::vector<float>;
 
 /// The mean of `values` around each pixel of a box that has a disparity: over 5x5 pixels, two apart, whose disparities

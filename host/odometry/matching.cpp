@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <limits>
 
 #include "host/cpu_clones.h"
 #include "host/odometry/subpixel.h"
@@ -18,7 +17,6 @@ constexpr int kBeyondInfinity_px = 2;               // and in the direction of t
 constexpr float kFarthestDisparity_px = -1;         // noise and rectification error at infinity
 constexpr float kMinCorrelation = 0.5f;
 constexpr float kMaxRowError_px = 2.5f;
-constexpr float kCannot = -std::numeric_limits<float>::infinity();
 
 struct Box {
   int x0, x1, y0, y1;  // inclusive
@@ -81,7 +79,7 @@ Flow predict_flow(const Calibration& c, const Eigen::Isometry3d& motion, double 
 // The disparity of left feature `i` at its refined place.
 float refined_disparity(TrackedFrame& frame, int i) {
   float& disparity = frame.disparity[i];
-  if (!std::isnan(disparity)) return disparity;
+  if (!is_untried(disparity)) return disparity;
   disparity = kCannot;
   const Feature& left = frame.left_features.features[i];
   const Feature& right = frame.right_features.features[frame.right_of_left[i]];
@@ -101,7 +99,7 @@ void TrackedFrame::reset_matches() {
   const int count = left_features.size();
   right_of_left.assign(count, kUnknown);
   left_of_right.assign(right_features.size(), kUnknown);
-  disparity.assign(count, std::numeric_limits<float>::quiet_NaN());
+  disparity.assign(count, kUntried);
   row_error.assign(count, 0);
   age.assign(count, 0);
   u.resize(count);
@@ -194,7 +192,7 @@ std::vector<PointMatch> refine_matches(const Calibration& calibration, TrackedFr
     if (!align_patch(patch, current.left, kMinCorrelation, u, v)) continue;
     current.u[j] = u;
     current.v[j] = v;
-    current.disparity[j] = std::numeric_limits<float>::quiet_NaN();
+    current.disparity[j] = kUntried;
     current.right_of_left[j] = match.current_right;
     const float d2 = refined_disparity(current, j);
     if (d2 == kCannot) continue;

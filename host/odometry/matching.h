@@ -2,6 +2,8 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cmath>
+#include <limits>
 #include <vector>
 
 #include "egosgm/calibration.h"
@@ -18,7 +20,7 @@ struct TrackedFrame {
   std::vector<int> right_of_left;  // index, kNoMatch or kUnknown
   std::vector<int> left_of_right;
   std::vector<float> u, v;       // refined position of a left feature; its pixel until a track refines it
-  std::vector<float> disparity;  // refined at (u, v); NaN: not yet, negative infinity: cannot be
+  std::vector<float> disparity;  // refined at (u, v), kUntried or kCannot
   std::vector<float> row_error;  // right less left row, where the disparity is known
   std::vector<int> age;          // frames that the feature was tracked for
 
@@ -27,6 +29,11 @@ struct TrackedFrame {
 
 inline constexpr int kNoMatch = -1;
 inline constexpr int kUnknown = -2;
+
+/// In place of a disparity that was not refined yet, and of one that cannot be.
+inline constexpr float kUntried = std::numeric_limits<float>::quiet_NaN();
+inline constexpr float kCannot = -std::numeric_limits<float>::infinity();
+inline bool is_untried(float disparity) { return std::isnan(disparity); }
 
 /// left k-1, left k, right k and right k-1.
 struct CircularMatch {

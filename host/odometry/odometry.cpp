@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <limits>
 #include <numeric>
 #include <sstream>
 #include <utility>
@@ -215,7 +214,7 @@ void StereoOdometry::State::keep_tracks(const std::vector<CircularMatch>& matche
     if (tracked[i]) continue;
     current.u[i] = current.left_features.features[i].x;
     current.v[i] = current.left_features.features[i].y;
-    current.disparity[i] = std::numeric_limits<float>::quiet_NaN();
+    current.disparity[i] = kUntried;
   }
 }
 
