@@ -212,33 +212,25 @@ TEST(Options, PaperChoosesAsThePaperDoes) {
 }
 
 TEST(Options, RangesEndWhereTheyAreSaidTo) {
-  const std::vector<std::pair<std::string, std::vector<std::string>>> allowed{{"disparities", {"1", "4096"}},
-                                                                              {"min_disparity", {"-16384", "16384"}},
-                                                                              {"paths", {"4", "8"}},
-                                                                              {"p1", {"0", "190"}},
-                                                                              {"p2", {"16", "190"}},
-                                                                              {"max_memory_mib", {"0", "2147483647"}},
-                                                                              {"max_speckle_px", {"0", "2147483647"}}};
-  for (const auto& [name, values] : allowed) {
-    for (const std::string& value : values) {
-      PipelineOptions options;
-      set_option(options, name, value);
-      EXPECT_NO_THROW(options.validate()) << name << " " << value;
-    }
-  }
-  const std::vector<std::pair<std::string, std::vector<std::string>>> refused{
-      {"disparities", {"0", "-1", "4097", "-2147483648"}},
-      {"min_disparity", {"-16385", "16385", "2147483647", "-2147483648"}},
-      {"paths", {"0", "1", "5", "16", "-8"}},
-      {"p1", {"-1", "191"}},
-      {"p2", {"-1", "191"}},
-      {"max_memory_mib", {"-1"}},
-      {"max_speckle_px", {"-1"}}};
-  for (const auto& [name, values] : refused) {
-    for (const std::string& value : values) {
-      PipelineOptions options;
-      set_option(options, name, value);
-      expect_refused([&] { options.validate(); }, {"option " + name + " is " + value + ": choose "});
+  struct Ends {
+    std::string name;
+    std::vector<std::string> allowed, refused;
+  };
+  const auto with = [](const std::string& name, const std::string& value) {
+    PipelineOptions options;
+    set_option(options, name, value);
+    return options;
+  };
+  for (const Ends& of : {Ends{"disparities", {"1", "4096"}, {"0", "-1", "4097", "-2147483648"}},
+                         {"min_disparity", {"-16384", "16384"}, {"-16385", "16385", "2147483647", "-2147483648"}},
+                         {"paths", {"4", "8"}, {"0", "1", "5", "16", "-8"}},
+                         {"p1", {"0", "190"}, {"-1", "191"}},
+                         {"p2", {"16", "190"}, {"-1", "191"}},
+                         {"max_memory_mib", {"0", "2147483647"}, {"-1"}},
+                         {"max_speckle_px", {"0", "2147483647"}, {"-1"}}}) {
+    for (const std::string& value : of.allowed) EXPECT_NO_THROW(with(of.name, value).validate()) << of.name << value;
+    for (const std::string& value : of.refused) {
+      expect_refused([&] { with(of.name, value).validate(); }, {"option " + of.name + " is " + value + ": choose "});
     }
   }
 }

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <initializer_list>
 #include <random>
 
 #include "host/stages/banded_sgm.h"
@@ -146,6 +147,11 @@ struct Scene {
     options.disparities = 32;
   }
 
+  float& measured() { return inputs.measured[kMiddle]; }
+  float& consistent() { return inputs.consistent[kMiddle]; }
+  float& believed() { return inputs.belief.disparity[kMiddle]; }
+  float& warped(int beside = 0) { return inputs.warped[kMiddle + beside]; }
+  std::uint8_t& evidence() { return inputs.evidence[kMiddle]; }
   void paint(int grey_of_column(int x, int y)) {
     for (int i = 0; i < 64 * 40; ++i) inputs.images[i] = grey_of_column(i % 64, i / 64);
   }
@@ -158,70 +164,62 @@ struct Scene {
   }
 };
 
+/// Changes of a scene, each on top of those before it, and what the pixel in the middle tells then.
+struct Change {
+  void (*change)(Scene& scene);
+  Reason reason;
+  const char* why = "";
+};
+void expect_after_each(std::initializer_list<Change> changes) {
+  Scene scene;
+  int count = 0;
+  for (const Change& change : changes) {
+    change.change(scene);
+    EXPECT_EQ(scene.in_the_middle(), change.reason) << "change " << ++count << " " << change.why;
+  }
+}
+
 TEST(Reasons, TrustsWhatIsMeasuredAsPredicted) { EXPECT_EQ(Scene().in_the_middle(), Reason::kTrusted); }
 
 TEST(Reasons, TellsAValueThatIsPredictedOnly) {
-  Scene scene;
-  scene.inputs.measured[Scene::kMiddle] = scene.inputs.consistent[Scene::kMiddle] = kNone;
-  EXPECT_EQ(scene.in_the_middle(), Reason::kPredicted);
-  scene.inputs.belief.disparity[Scene::kMiddle] = kNone;
-  EXPECT_EQ(scene.in_the_middle(), Reason::kUnconfirmed);
-  scene.inputs.consistent[Scene::kMiddle] = 10;
-  EXPECT_EQ(scene.in_the_middle(), Reason::kSpeckle);
-  scene.options.speckle_removal.max_size_px = 0;
-  EXPECT_EQ(scene.in_the_middle(), Reason::kUnconfirmed) << "nothing is dropped as a speckle";
+  expect_after_each({{[](Scene& s) { s.measured() = s.consistent() = kNone; }, Reason::kPredicted},
+                     {[](Scene& s) { s.believed() = kNone; }, Reason::kUnconfirmed},
+                     {[](Scene& s) { s.consistent() = 10; }, Reason::kSpeckle},
+                     {[](Scene& s) { s.options.speckle_removal.max_size_px = 0; }, Reason::kUnconfirmed,
+                      "nothing is dropped as a speckle"}});
 }
 
 TEST(Reasons, TellsAContradiction) {
-  Scene scene;
-  scene.inputs.doubtful[Scene::kMiddle] = 1;
-  EXPECT_EQ(scene.in_the_middle(), Reason::kContradicted);
-  scene.inputs.warped[Scene::kMiddle] = kNone;
-  EXPECT_EQ(scene.in_the_middle(), Reason::kTrusted) << "nothing was predicted that could contradict";
-  scene.inputs.warped[Scene::kMiddle] = 12;
-  scene.inputs.belief.disparity[Scene::kMiddle] = kNone;
-  EXPECT_EQ(scene.in_the_middle(), Reason::kContradicted);
-  scene.inputs.warped[Scene::kMiddle] = 11;
-  EXPECT_EQ(scene.in_the_middle(), Reason::kUnconfirmed);
+  expect_after_each({{[](Scene& s) { s.inputs.doubtful[Scene::kMiddle] = 1; }, Reason::kContradicted},
+                     {[](Scene& s) { s.warped() = kNone; }, Reason::kTrusted, "nothing was predicted that could"},
+                     {[](Scene& s) { s.warped() = 12, s.believed() = kNone; }, Reason::kContradicted},
+                     {[](Scene& s) { s.warped() = 11; }, Reason::kUnconfirmed}});
 }
 
 TEST(Reasons, TellsWhatCameIntoViewBesideSomethingNearer) {
-  Scene scene;
-  for (int x = 28; x <= 36; ++x) scene.inputs.warped[20 * 64 + x] = kNone;
-  EXPECT_EQ(scene.in_the_middle(), Reason::kTrusted) << "a hole in a surface";
-  scene.inputs.warped[20 * 64 + 40] = 13.5f;
-  EXPECT_EQ(scene.in_the_middle(), Reason::kUncovered);
-  scene.inputs.belief.disparity[Scene::kMiddle] = kNone;
-  EXPECT_EQ(scene.in_the_middle(), Reason::kUncovered);
-  scene.inputs.warped[20 * 64 + 40] = kNone;
-  scene.inputs.warped[20 * 64 + 41] = 13.5f;
-  EXPECT_EQ(scene.in_the_middle(), Reason::kUnconfirmed) << "too far off";
+  const auto hole = [](Scene& s) {
+    for (int x = -4; x <= 4; ++x) s.warped(x) = kNone;
+  };
+  expect_after_each(
+      {{hole, Reason::kTrusted, "a hole in a surface"},
+       {[](Scene& s) { s.warped(8) = 13.5f; }, Reason::kUncovered},
+       {[](Scene& s) { s.believed() = kNone; }, Reason::kUncovered},
+       {[](Scene& s) { s.warped(8) = kNone, s.warped(9) = 13.5f; }, Reason::kUnconfirmed, "too far off"}});
 }
 
 TEST(Reasons, TellsWhatIsHiddenByWhatIsNearerThanTheRange) {
-  Scene scene;
-  scene.inputs.hidden[Scene::kMiddle] = 1;
-  EXPECT_EQ(scene.in_the_middle(), Reason::kNearer);
+  expect_after_each({{[](Scene& s) { s.inputs.hidden[Scene::kMiddle] = 1; }, Reason::kNearer}});
 }
 
 TEST(Reasons, TrustsNothingThatTheImagesHardlySay) {
-  Scene scene;
-  scene.inputs.evidence.assign(scene.inputs.doubtful.size(), 96);
-  EXPECT_EQ(scene.in_the_middle(), Reason::kTrusted);
-  scene.inputs.evidence[Scene::kMiddle] = 95;
-  EXPECT_EQ(scene.in_the_middle(), Reason::kFlat);
-  scene.inputs.measured[Scene::kMiddle] = kNone;
-  EXPECT_EQ(scene.in_the_middle(), Reason::kPredicted) << "nothing was measured";
-  scene.inputs.measured[Scene::kMiddle] = 10;
-  scene.inputs.belief.disparity[Scene::kMiddle] = kNone;
-  EXPECT_EQ(scene.in_the_middle(), Reason::kUnconfirmed) << "what has no value has no evidence either";
-  scene.inputs.block_evidence[5 * 16 + 8] = 0;
-  EXPECT_EQ(scene.in_the_middle(), Reason::kUnconfirmed) << "nothing was matched there";
-  scene.inputs.block_evidence[5 * 16 + 8] = 71;
-  EXPECT_EQ(scene.in_the_middle(), Reason::kFlat) << "no better than noise";
-  scene.inputs.belief.disparity[Scene::kMiddle] = 10;
-  scene.inputs.evidence[Scene::kMiddle] = 96;
-  EXPECT_EQ(scene.in_the_middle(), Reason::kTrusted) << "it has a value";
+  expect_after_each(
+      {{[](Scene& s) { s.inputs.evidence.assign(s.inputs.doubtful.size(), 96); }, Reason::kTrusted},
+       {[](Scene& s) { s.evidence() = 95; }, Reason::kFlat},
+       {[](Scene& s) { s.measured() = kNone; }, Reason::kPredicted, "nothing was measured"},
+       {[](Scene& s) { s.measured() = 10, s.believed() = kNone; }, Reason::kUnconfirmed, "no value, no evidence"},
+       {[](Scene& s) { s.inputs.block_evidence[5 * 16 + 8] = 0; }, Reason::kUnconfirmed, "nothing was matched there"},
+       {[](Scene& s) { s.inputs.block_evidence[5 * 16 + 8] = 71; }, Reason::kFlat, "no better than noise"},
+       {[](Scene& s) { s.believed() = 10, s.evidence() = 96; }, Reason::kTrusted, "it has a value"}});
 }
 
 TEST(Reasons, TrustsWhatHasEvidenceHoweverDarkItIs) {
@@ -230,29 +228,25 @@ TEST(Reasons, TrustsWhatHasEvidenceHoweverDarkItIs) {
   EXPECT_EQ(scene.in_the_middle(), Reason::kFlat) << "a value without evidence";
   scene.inputs.evidence.assign(scene.inputs.doubtful.size(), 96);
   EXPECT_EQ(scene.in_the_middle(), Reason::kFlat) << "it began with that much";
-  scene.inputs.evidence[Scene::kMiddle] = 97;
+  scene.evidence() = 97;
   EXPECT_NE(scene.in_the_middle(), Reason::kFlat);
-  scene.inputs.belief.disparity[Scene::kMiddle] = kNone;
+  scene.believed() = kNone;
   EXPECT_EQ(scene.in_the_middle(), Reason::kFlat) << "a hole says why it is one";
 }
 
 TEST(Reasons, TellsWhatTheImageCannotTell) {
   Scene scene;
-  scene.paint([](int x, int) { return 100 + x % 2; });
-  EXPECT_EQ(scene.in_the_middle(), Reason::kFlat);
   scene.paint([](int x, int y) { return 10 + (x * 37 + y * 53) % 3; });
-  EXPECT_EQ(scene.in_the_middle(), Reason::kFlat);
   scene.inputs.grey_step = 0.25f;
   EXPECT_NE(scene.in_the_middle(), Reason::kFlat) << "a dark image fills few levels";
-  scene.inputs.grey_step = 1;
-  scene.paint([](int, int) { return 255; });
-  EXPECT_EQ(scene.in_the_middle(), Reason::kSaturated);
-  scene.paint([](int, int) { return 0; });
-  EXPECT_EQ(scene.in_the_middle(), Reason::kSaturated);
-  scene.paint([](int x, int y) { return 60 + (x % 12 * 37 + y * 17) % 101; });  // every 12 columns
-  EXPECT_EQ(scene.in_the_middle(), Reason::kAmbiguous);
-  scene.options.disparities = 12;
-  EXPECT_EQ(scene.in_the_middle(), Reason::kTrusted) << "no disparity of the range takes one for the other";
+  static constexpr auto kRepeats = [](int x, int y) { return 60 + (x % 12 * 37 + y * 17) % 101; };  // every 12 columns
+  expect_after_each(
+      {{[](Scene& s) { s.paint([](int x, int) { return 100 + x % 2; }); }, Reason::kFlat},
+       {[](Scene& s) { s.paint([](int x, int y) { return 10 + (x * 37 + y * 53) % 3; }); }, Reason::kFlat},
+       {[](Scene& s) { s.paint([](int, int) { return 255; }); }, Reason::kSaturated},
+       {[](Scene& s) { s.paint([](int, int) { return 0; }); }, Reason::kSaturated},
+       {[](Scene& s) { s.paint(kRepeats); }, Reason::kAmbiguous},
+       {[](Scene& s) { s.options.disparities = 12; }, Reason::kTrusted, "no disparity takes one for the other"}});
 }
 
 }  // namespace

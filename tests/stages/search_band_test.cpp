@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <utility>
 
 #include "host/frame/frame_transfer.h"
 #include "tests/reference/present_rows.h"
@@ -19,6 +20,9 @@ using testing::HostMaps;
 using testing::same_bits;
 
 constexpr shared::DisparityRange kRanges[] = {{0, 1}, {0, 16}, {-20, 37}, {0, 128}, {3, 1027}};
+
+using Ends = std::pair<int, int>;
+Ends ends(const shared::Band& band) { return {band.first, band.last}; }
 
 reference::SearchBands read(ocl::Context& context, const SearchBands& bands) {
   return {bands.bands.read(context), bands.cell_offsets.read(context), bands.row_sums.read(context)};
@@ -176,10 +180,8 @@ TEST(SearchBand, PredictedPixelSearchesItsDeviations) {
   maps.disparity[0] = 40.25f, maps.variance[0] = 4.0f;  // +- 3 * 2
   maps.disparity[1] = 60.5f, maps.variance[1] = 0.01f;  // +- the minimum
   const auto bands = run(size, {0, 128}, {.sigmas = 3, .min_half_width_px = 2, .from_neighbours = false}, maps).bands;
-  EXPECT_EQ(bands[0].first, 34);  // 34.25
-  EXPECT_EQ(bands[0].last, 47);   // 46.25
-  EXPECT_EQ(bands[1].first, 58);  // 58.5
-  EXPECT_EQ(bands[1].last, 63);   // 62.5
+  EXPECT_EQ(ends(bands[0]), (Ends{34, 47}));  // 34.25, 46.25
+  EXPECT_EQ(ends(bands[1]), (Ends{58, 63}));  // 58.5, 62.5
   EXPECT_EQ(bands[1].chunks, 1);
   EXPECT_EQ(bands[1].origin, 57);  // one of two spare lanes below
 }
@@ -191,10 +193,7 @@ TEST(SearchBand, AbsurdVarianceSearchesEverything) {
   maps.variance = {1e30f, std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN(), 0, 0, 0, 0,
                    0};
   const auto bands = run(size, {-8, 100}, {}, maps).bands;
-  for (int x = 0; x < 3; ++x) {
-    EXPECT_EQ(bands[x].first, -8) << x;
-    EXPECT_EQ(bands[x].last, 91) << x;
-  }
+  for (int x = 0; x < 3; ++x) EXPECT_EQ(ends(bands[x]), (Ends{-8, 91})) << x;
 }
 
 TEST(SearchBand, UnpredictedPixelSearchesWhatItsNeighboursSpan) {
@@ -203,12 +202,10 @@ TEST(SearchBand, UnpredictedPixelSearchesWhatItsNeighboursSpan) {
   for (int x = 16; x < 32; ++x) maps.disparity[20 * 64 + x] = x == 20 ? 50.5f : 40.25f;
   const SearchBandOptions options{.neighbour_min_count = 8, .neighbour_margin_px = 4};
   const auto bands = run(size, {0, 128}, options, maps).bands;
-  EXPECT_EQ(bands[25 * 64 + 24].first, 36);
-  EXPECT_EQ(bands[25 * 64 + 24].last, 55);
+  EXPECT_EQ(ends(bands[25 * 64 + 24]), (Ends{36, 55}));
   EXPECT_EQ(bands[25 * 64 + 24].chunks, 4);
   EXPECT_EQ(bands[40 * 64 + 24].last - bands[40 * 64 + 24].first, 127) << "two blocks below: none near";
-  EXPECT_EQ(bands[25 * 64 + 32].first, 36) << "beside the block of x 24..31";
-  EXPECT_EQ(bands[25 * 64 + 32].last, 45);
+  EXPECT_EQ(ends(bands[25 * 64 + 32]), (Ends{36, 45})) << "beside the block of x 24..31";
   EXPECT_EQ(bands[4096 + 25 * 64 + 24].last, 127) << "the right view has no predictions";
 
   maps.disparity[20 * 64 + 31] = EGOSGM_INVALID_DISPARITY;  // seven left around (32, 25)
@@ -226,11 +223,9 @@ TEST(SearchBand, ReachesWhatTheCoarseMatchFoundElsewhere) {
   const SearchBandOptions options{
       .min_half_width_px = 2, .neighbour_min_count = 1, .coarse_tolerance_px = 3, .coarse_margin_px = 2};
   const auto bands = run(size, {0, 128}, options, maps, 0, coarse).bands;
-  EXPECT_EQ(bands[20 * 64 + 20].first, 38);
-  EXPECT_EQ(bands[20 * 64 + 20].last, 82);
+  EXPECT_EQ(ends(bands[20 * 64 + 20]), (Ends{38, 82}));
   EXPECT_EQ(bands[20 * 64 + 60].last, 42) << "nothing was found there";
-  EXPECT_EQ(bands[20 * 64 + 21].first, 36) << "unpredicted: what is predicted around and what was found";
-  EXPECT_EQ(bands[20 * 64 + 21].last, 82);
+  EXPECT_EQ(ends(bands[20 * 64 + 21]), (Ends{36, 82})) << "unpredicted: what is predicted around and what was found";
   EXPECT_EQ(bands[44 * 64 + 20].last, 127) << "nothing is predicted around";
   EXPECT_EQ(bands[4096 + 20 * 64 + 20].last, 127) << "the right view";
 
@@ -256,10 +251,8 @@ TEST(SearchBand, PredictedPixelReachesWhatItsBlockSpans) {
   for (int x = 8; x < 24; ++x) maps.disparity[3 * 24 + x] = x < 12 ? 40 : 60;
   const SearchBandOptions options{.min_half_width_px = 2, .coarse_tolerance_px = 3, .coarse_margin_px = 1};
   const auto bands = run(size, {0, 128}, options, maps).bands;
-  EXPECT_EQ(bands[3 * 24 + 8].first, 38);
-  EXPECT_EQ(bands[3 * 24 + 8].last, 61);
-  EXPECT_EQ(bands[3 * 24 + 15].first, 39);
-  EXPECT_EQ(bands[3 * 24 + 15].last, 62);
+  EXPECT_EQ(ends(bands[3 * 24 + 8]), (Ends{38, 61}));
+  EXPECT_EQ(ends(bands[3 * 24 + 15]), (Ends{39, 62}));
   EXPECT_EQ(bands[3 * 24 + 16].first, 58) << "the block beside";
   for (int x = 8; x < 12; ++x) maps.disparity[3 * 24 + x] = 55;  // within 3 px of what is searched anyway
   EXPECT_EQ(run(size, {0, 128}, options, maps).bands[3 * 24 + 15].first, 58);

@@ -88,6 +88,15 @@ class ImageIo : public ::testing::Test {
     named.push_back(file_.string());
     expect_refused([&] { read_grey_image(file_); }, named);
   }
+  /// Without a word on the standard error.
+  void expect_truncations_unreadable(const std::string& whole) const {
+    ::testing::internal::CaptureStderr();
+    for (std::size_t bytes = 0; bytes < whole.size(); ++bytes) {
+      write_file(file_, whole.substr(0, bytes));
+      expect_unreadable({"not a readable image (truncated?)"});
+    }
+    EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
+  }
 
   const TemporaryFolder folder_;
   const std::filesystem::path file_ = folder_ / "image.png";  // JPEGs are known by what they hold
@@ -169,13 +178,7 @@ TEST_F(ImageIo, PlainFilesOfEveryFilterAreReadAsTheyAre) {
 TEST_F(ImageIo, EveryTruncationIsRefusedInSilence) {
   std::mt19937 random(4);
   write_png(file_, random_image(random, 23, 11, CV_8UC1));
-  const std::string whole = read_file(file_, 1 << 20);
-  ::testing::internal::CaptureStderr();
-  for (std::size_t bytes = 0; bytes < whole.size(); ++bytes) {
-    write_file(file_, whole.substr(0, bytes));
-    expect_unreadable({"not a readable image (truncated?)"});
-  }
-  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
+  expect_truncations_unreadable(read_file(file_, 1 << 20));
 }
 
 TEST_F(ImageIo, EveryDamagedByteIsRefused) {
@@ -302,13 +305,7 @@ TEST_F(ImageIo, AJpegsSizeMayStandBehindALongComment) {
 
 TEST_F(ImageIo, EveryTruncationOfAJpegIsRefusedInSilence) {
   for (const int progressive : {0, 1}) {
-    const std::string whole = jpeg_of(smooth_image(17, 9, CV_8UC3), {cv::IMWRITE_JPEG_PROGRESSIVE, progressive});
-    ::testing::internal::CaptureStderr();
-    for (std::size_t bytes = 0; bytes < whole.size(); ++bytes) {
-      write_file(file_, whole.substr(0, bytes));
-      expect_unreadable({"not a readable image (truncated?)"});
-    }
-    EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
+    expect_truncations_unreadable(jpeg_of(smooth_image(17, 9, CV_8UC3), {cv::IMWRITE_JPEG_PROGRESSIVE, progressive}));
   }
 }
 
