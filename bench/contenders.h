@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Who takes turns in egosgm_compare.
+// The contenders of egosgm_compare, which takes turns with them.
 #pragma once
 
 #include <functional>

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is refused, and in which words: as expect_refused of the C++ tests."""
+"""Checks that a call is refused, as expect_refused of the C++ tests does."""
 import egosgm
 import pytest
 

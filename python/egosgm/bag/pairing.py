@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which left and right images of a recording belong together, by their stamps, and what is unusual about these."""
+"""Pairs the left and right images of a recording by their stamps, and tells what is unusual about these."""
 import bisect
 import collections
 import dataclasses

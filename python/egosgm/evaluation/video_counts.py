@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the frames of a video count, each alone and with the frame before: errors, changes, regions, uncertainty. docs/use/evaluation.md has the formulas."""
+"""Counts of a video's frames, each alone and with the frame before: errors, changes, regions, uncertainty. docs/use/evaluation.md has the formulas."""
 import collections
 import concurrent.futures
 import dataclasses
