@@ -222,6 +222,14 @@ TEST(Reasons, TrustsNothingThatTheImagesHardlySay) {
        {[](Scene& s) { s.believed() = 10, s.evidence() = 96; }, Reason::kTrusted, "it has a value"}});
 }
 
+TEST(Reasons, CallsFlatWhatChangesByLessThanTwoGreyLevels) {
+  Scene scene;
+  scene.paint([](int x, int) { return 64 + x; });
+  EXPECT_NE(scene.in_the_middle(), Reason::kFlat);
+  scene.paint([](int x, int y) { return 64 + x - (x > 32 && y == 20); });
+  EXPECT_EQ(scene.in_the_middle(), Reason::kFlat);
+}
+
 TEST(Reasons, TrustsWhatHasEvidenceHoweverDarkItIs) {
   Scene scene;
   scene.paint([](int x, int) { return 4 + x % 2; });
