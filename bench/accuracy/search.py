@@ -47,16 +47,24 @@ class Variant:
     """A copy of the checkout, whose kernels/method.h has other numbers."""
 
     def __init__(self, bench):
-        self.bench, self.folder, self.built = bench, bench.work / "search", {}
+        self.bench, self.folder, self.copied = bench, bench.work / "search", False
+
+    def copy(self):
+        """The checkout as it is now. What an earlier search built stays, and is built again where files are newer."""
+        for old in self.folder.glob("*"):
+            if old.name != "build":
+                shutil.rmtree(old) if old.is_dir() else old.unlink()
+        files = subprocess.run(["git", "ls-files", "-z"], cwd=PROJECT, capture_output=True, text=True, check=True).stdout.split("\0")
+        for name in filter(None, files):
+            (self.folder / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(PROJECT / name, self.folder / name)
+        self.copied = True
 
     def program(self, macros):
         if not macros:
             return self.bench.egosgm.path
-        if not self.folder.exists():
-            files = subprocess.run(["git", "ls-files", "-z"], cwd=PROJECT, capture_output=True, text=True, check=True).stdout.split("\0")
-            for name in filter(None, files):
-                (self.folder / name).parent.mkdir(parents=True, exist_ok=True)
-                shutil.copy(PROJECT / name, self.folder / name)
+        if not self.copied:
+            self.copy()
         text = (PROJECT / "kernels/method.h").read_text()
         for name, value in macros.items():
             text = re.sub(rf"^(#define {name}) .*", rf"\1 {value}{'f' if isinstance(value, float) else ''}", text, flags=re.MULTILINE)
