@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "host/quantile.h"
 #include "vision/grey_bytes.h"
 #include "vision/no_value.h"
 #include "vision/wide_matching.h"
@@ -101,9 +102,9 @@ std::optional<Clipped> clipped_by_range(const Image& left, const Image& right, i
   const auto above = std::count_if(disparities.begin(), disparities.end(), [&](float d) { return d > end - 1; });
   const double share = static_cast<double>(above) / static_cast<double>(disparities.size());
   if (share <= kClippedShare) return std::nullopt;
-  const auto high = disparities.begin() + std::lround(0.995 * static_cast<double>(disparities.size() - 1));
-  std::nth_element(disparities.begin(), high, disparities.end());
-  return Clipped{share, 16 * static_cast<int>(std::ceil((1.1 * *high - least + 1) / 16))};
+  const auto at = static_cast<std::size_t>(std::lround(0.995 * static_cast<double>(disparities.size() - 1)));
+  const double high = nth_value(std::move(disparities), at);
+  return Clipped{share, 16 * static_cast<int>(std::ceil((1.1 * high - least + 1) / 16))};
 }
 
 }  // namespace egosgm::vision

@@ -9,6 +9,7 @@
 
 #include "egosgm/error.h"
 #include "egosgm/vision/disparity_io.h"
+#include "host/quantile.h"
 #include "vision/file_io.h"
 
 namespace egosgm::vision {
@@ -28,12 +29,6 @@ bool is_whole_npy(const std::filesystem::path& file) {
   const std::size_t at = start.find("'descr'"), type = at == std::string::npos ? at : start.find('\'', at + 7);
   return start.starts_with("\x93NUMPY") && type != std::string::npos && type + 2 < start.size() &&
          (start[type + 2] == 'i' || start[type + 2] == 'u');
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 }  // namespace

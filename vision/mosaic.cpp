@@ -8,6 +8,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "host/quantile.h"
+
 namespace egosgm::vision {
 namespace {
 
@@ -44,10 +46,7 @@ bool holds_mosaic(const Image& grey) {
   for (int y = 0; y + kBlock <= grey.rows; y += kBlock) {
     for (int x = 0; x + kBlock <= grey.cols; x += kBlock) differences.push_back(difference_in(grey, y, x));
   }
-  if (differences.empty()) return false;
-  const auto middle = differences.begin() + static_cast<std::ptrdiff_t>(differences.size() / 2);
-  std::nth_element(differences.begin(), middle, differences.end());
-  return *middle > kLeastDifference;
+  return !differences.empty() && median(std::move(differences)) > kLeastDifference;
 }
 
 }  // namespace egosgm::vision

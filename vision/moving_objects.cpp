@@ -8,6 +8,7 @@
 
 #include "egosgm/error.h"
 #include "host/odometry/geometry.h"
+#include "host/quantile.h"
 #include "vision/no_value.h"
 #include "vision/pixel_group.h"
 #include "vision/pixel_motion.h"
@@ -56,10 +57,7 @@ double median_over(const Group& group, const Value& value) {
   for (std::size_t i = 0; i < group.pixels.size(); i += step) {
     if (const std::optional<double> each = value(group.pixels[i])) values.push_back(*each);
   }
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  return values.empty() ? 0 : median(std::move(values));
 }
 
 /// The share of a few of a group's pixels for which `holds` does.
@@ -293,12 +291,9 @@ BoxValues ObjectTracker::State::costs(const Box& box, const BoxValues& dispariti
 bool ObjectTracker::State::label(Candidate& candidate) const {
   std::vector<double> disparities;
   for (const Pixel& p : candidate.group.pixels) disparities.push_back(disparity(p));
-  const auto quantile = [&](double part) {
-    const auto at = static_cast<std::ptrdiff_t>(part * static_cast<double>(disparities.size() - 1));
-    std::nth_element(disparities.begin(), disparities.begin() + at, disparities.end());
-    return disparities[static_cast<std::size_t>(at)];
-  };
-  const double low = quantile(0.06), high = quantile(0.94);
+  const auto last = static_cast<double>(disparities.size() - 1);
+  const double low = nth_value(disparities, static_cast<std::size_t>(0.06 * last));
+  const double high = nth_value(disparities, static_cast<std::size_t>(0.94 * last));
   const double least = low - 0.5 * alike_px(low), most = high + 0.5 * alike_px(high);
   const Box box = candidate.group.box.padded(candidate.is_new() ? kNewPad_px : kKnownPad_px, size);
   BoxValues near(box.area(), kNoValue);  // disparities as those of the group

@@ -7,6 +7,8 @@
 #include <cstdio>
 #include <utility>
 
+#include "host/quantile.h"
+
 namespace egosgm::vision {
 namespace {
 
@@ -15,12 +17,6 @@ using Motion = Eigen::Isometry3d;
 constexpr double kLeastMove_m = 0.01, kLeastTurn = 0.003;  // less is noise of the odometry
 constexpr double kAgrees = 0.35;                           // of a motion, in the median
 constexpr std::size_t kFewestMoves = 2;
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 double angle_of(const Motion& motion) { return Eigen::AngleAxisd(motion.rotation()).angle(); }
 

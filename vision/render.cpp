@@ -10,6 +10,7 @@
 #include "egosgm/error.h"
 #include "egosgm/reason.h"
 #include "egosgm/vision/disparity_io.h"
+#include "host/quantile.h"
 #include "vision/drawing.h"
 #include "vision/image_values.h"
 
@@ -119,10 +120,9 @@ ColorRange disparity_range(const Image& disparity) {
     std::copy_if(row, row + disparity.cols, std::back_inserter(values), is_valid_disparity);
   }
   if (values.empty()) return {.low = 0, .high = 1};
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(kQuantile * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  const double high = *at;
   const double low = std::min(0.0, static_cast<double>(*std::min_element(values.begin(), values.end())));
+  const auto at = static_cast<std::size_t>(kQuantile * static_cast<double>(values.size() - 1));
+  const double high = nth_value(std::move(values), at);
   return {.low = low, .high = std::max(high, low + 1.0)};
 }
 

@@ -9,6 +9,7 @@
 #include "egosgm/vision/evaluation.h"
 #include "host/cpu_clones.h"
 #include "host/odometry/geometry.h"
+#include "host/quantile.h"
 #include "vision/image_values.h"
 #include "vision/no_value.h"
 
@@ -295,11 +296,7 @@ Eigen::Isometry3d best_shift(const Calibration& calibration, const AlignedView& 
     moved_points.push_back(seen);
   }
   if (moved_points.empty()) return camera;
-  double change = 0;
-  if (!changes.empty()) {
-    std::nth_element(changes.begin(), changes.begin() + changes.size() / 2, changes.end());
-    change = changes[changes.size() / 2];
-  }
+  double change = changes.empty() ? 0 : median(std::move(changes));
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (const Eigen::Vector3d& seen : moved_points) middle += seen;
   middle /= static_cast<double>(moved_points.size());

@@ -9,6 +9,8 @@
 #include <limits>
 #include <map>
 
+#include "host/quantile.h"
+
 namespace egosgm::odometry {
 namespace {
 
@@ -165,12 +167,6 @@ std::string too_few(const StereoOdometryOptions& options, std::size_t inliers, s
     return format("inlier ratio %.2f is below %.2f", static_cast<double>(inliers) / matches, options.min_inlier_ratio);
   }
   return {};
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // By how much the inliers' disparities grew, and by how much beyond what the motion explains: medians [px].
