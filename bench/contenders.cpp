@@ -5,9 +5,9 @@
 
 #include <chrono>
 #include <memory>
+#include <opencv2/calib3d.hpp>
 #include <opencv2/core/utility.hpp>
 
-#include "bench/opencv_matcher.h"
 #include "egosgm/error.h"
 #include "egosgm/named_options.h"
 #include "egosgm/odometry.h"
@@ -97,8 +97,24 @@ class Matcher {
   vision::Image disparity_, variance_, dynamic_;
 };
 
+struct OpencvMode {
+  const char* name;
+  int mode;
+};
+
+/// Eight paths, four, five, three; only the first two keep costs of the whole image.
+constexpr OpencvMode kOpencvModes[] = {{"opencv_hh", cv::StereoSGBM::MODE_HH},
+                                       {"opencv_hh4", cv::StereoSGBM::MODE_HH4},
+                                       {"opencv_sgbm", cv::StereoSGBM::MODE_SGBM},
+                                       {"opencv_3way", cv::StereoSGBM::MODE_SGBM_3WAY}};
+
+/// With the penalties that OpenCV's documentation gives and the other settings of its sample stereo_match, but without
+/// speckle removal.
 TurnFunction opencv(const OpencvMode& mode, const Clip& clip, int disparities, int threads) {
-  const auto matcher = make_opencv_matcher(mode.mode, disparities);
+  constexpr int kBlock = 5, kDisp12MaxDiff = 1, kPreFilterCap = 63, kUniquenessRatio = 10;
+  const cv::Ptr<cv::StereoSGBM> matcher = cv::StereoSGBM::create(
+      /*minDisparity=*/0, (disparities + 15) / 16 * 16, kBlock, 8 * kBlock * kBlock, 32 * kBlock * kBlock,
+      kDisp12MaxDiff, kPreFilterCap, kUniquenessRatio, /*speckleWindowSize=*/0, /*speckleRange=*/0, mode.mode);
   const auto disparity = std::make_shared<cv::Mat>();
   return [&clip, matcher, disparity, threads] {
     const ClipFrame& frame = clip.frames.back();

@@ -92,7 +92,6 @@ class Bench:
             sys.exit(f"accuracy: no program {chosen}: run scripts/build, or give --egosgm FILE")
         self.compare = program_at(build / "bench/egosgm_compare")
         self.odometry = program_at(build / "bench/egosgm_odometry")
-        self.opencv = program_at(build / "bench/egosgm_opencv_sgbm")
         self.data = pathlib.Path(arguments.data or os.environ.get("EGOSGM_DATA") or PROJECT / "../shared/data")
         self.work = pathlib.Path(arguments.work)
         self.work.mkdir(parents=True, exist_ok=True)

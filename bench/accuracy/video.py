@@ -16,7 +16,7 @@ from inputs import SINGLE_FRAME, STEADY_FROM, Missing, expect, measured, told
 
 ALPHA = 0.4
 OURS, SINGLE = "EgoSGM", "EgoSGM, single frame"
-OPENCV = {"OpenCV HH": "opencv_hh", "OpenCV 3WAY": "opencv_3way"}
+OPENCV = {"OpenCV HH": "HH", "OpenCV 3WAY": "SGBM_3WAY"}  # modes
 # Whether along the motion, and the step [px].
 FILTERS = {"OpenCV HH, averaged at the same pixel, step 20/32 px": (False, 20 / 32), "OpenCV HH, averaged along the motion, step 20/32 px": (True, 20 / 32),
            "OpenCV HH, averaged at the same pixel, step 20 px": (False, 20), "OpenCV HH, averaged along the motion, step 20 px": (True, 20)}
@@ -111,10 +111,18 @@ class Maps:
         self.bench.egosgm("run", *self.video.run_arguments(), *arguments, "--out", folder, "--write", "variance", "--quiet")
 
     def match_opencv(self, folder, mode):
-        if not self.bench.opencv:
-            raise Missing("no program egosgm_opencv_sgbm: build with EGOSGM_BENCH=ON")
+        """With the settings of bench/contenders.cpp. StereoSGBM gives nothing in as many columns as there are disparities: images are padded."""
+        try:
+            import cv2
+        except ImportError as reason:
+            raise Missing(f"{reason}: needs OpenCV's Python module") from None
+        np, count, block = self.figures.np, OPENCV_DISPARITIES, 5
+        matcher = cv2.StereoSGBM_create(minDisparity=0, numDisparities=count, blockSize=block, P1=8 * block**2, P2=32 * block**2, disp12MaxDiff=1,
+                                        preFilterCap=63, uniquenessRatio=10, mode=getattr(cv2, f"StereoSGBM_MODE_{mode}"))
         for frame in self.sequence.frames:
-            self.bench.opencv(mode, frame.left, frame.right, OPENCV_DISPARITIES, folder / f"{frame.name}.png")
+            steps = matcher.compute(*(np.pad(image, ((0, 0), (count, 0)), "edge") for image in frame.read()))[:, count:]
+            disparity = np.where(steps < 0, self.egosgm.INVALID_DISPARITY, steps / np.float32(16))
+            self.egosgm.write_disparity(folder / f"{frame.name}.png", disparity.astype(np.float32))
 
     def average(self, folder, source, along_motion, step_px):
         world_from_camera = self.egosgm.read_poses(self.of(OURS) / "poses.txt")
