@@ -201,6 +201,19 @@ class ManySequences(ProgramTest):
         self.assert_refused(["eval", "--merge", reports[0], "--mask", reports[1]], "--merge")
         self.assert_refused(["eval", out / "street-0", "--merge", reports[0]], "--merge")
 
+    def test_a_task_of_slurm_goes_back_into_the_queue_where_it_may_pass(self):
+        """The script of the job array, with commands in the place of run_line and scontrol."""
+        tools = self.new_folder()
+        for name, body in (("run_line", 'echo "$@"; exit $CODE'), ("scontrol", 'echo "scontrol $@"')):
+            (tools / name).write_text(f"#!/bin/sh\n{body}\n")
+            (tools / name).chmod(0o755)
+        again = "exit code 1: task 3 goes back into the queue\nscontrol requeue 7_3\n"
+        for code, restarts, said in ((0, 0, ""), (1, 2, again), (1, 3, ""), (2, 0, "")):
+            slurm = dict(SLURM_ARRAY_JOB_ID="7", SLURM_ARRAY_TASK_ID="3", SLURM_RESTART_COUNT=str(restarts))
+            done = subprocess.run(["bash", SOURCE / "examples/cluster/sequences.sbatch", "list", "out", "--quiet"], capture_output=True, text=True, timeout=60,
+                                  env=dict(os.environ, **slurm, CODE=str(code), RUN_LINE=str(tools / "run_line"), PATH=f"{tools}:{os.environ['PATH']}"))
+            self.assertEqual((done.returncode, done.stdout), (code, "list 3 out --quiet\n" + said))
+
     def test_a_range_beyond_kittis_png_loses_nothing(self):
         """Seen from the other side, all disparities are negative."""
         folder = self.new_folder()
