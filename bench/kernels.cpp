@@ -1,13 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Every kernel of a full and of a steady frame: its time on the device, and the roofs of the device. bench/kernels.py
 // makes a table and a picture of it.
-#include <dlfcn.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
-#include <cstdlib>
-#include <filesystem>
 #include <map>
 #include <string>
 #include <utility>
@@ -30,7 +26,6 @@ constexpr const char* kHelp =
     "  --rounds N        median of N rounds of five frames of each kind (3)\n"
     "  --threads N       compute units of PoCL (2)\n"
     "  --json FILE       write the rows\n"
-    "  --export DIR      time nothing; write each kernel as a case that stands alone to this new folder\n"
     "  --count           time nothing; run a frame of each kind, and print which and how many cells it matched after "
     "it\n"
     "Rows: FRAME.STAGE.KERNEL. Columns: ms of a frame (median), with quartiles; launches; cells: that the frame "
@@ -90,15 +85,6 @@ double build_s(const Device& device, const Street& street, int disparities) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// The first frame of each kind, by the layer that the loader has loaded where OPENCL_LAYERS names it.
-void write_cases(ocl::Context& context, const Street& street, int disparities, const std::string& folder) {
-  void* const layer = dlopen(CASE_LAYER, RTLD_NOW | RTLD_NOLOAD);
-  if (!layer) throw DeviceError(0, "--export: this OpenCL loader has no layers: take that of ocl-icd 2.3 or Khronos");
-  const auto into = reinterpret_cast<void (*)(const char*, const char*)>(dlsym(layer, "egosgm_cases_into"));
-  const StreetFrame frame(context, street, disparities, Scheduling::kAutomatic,
-                          [&](const char* kind) { into(folder.c_str(), kind); });
-}
-
 /// For tools that count what kernels do: one frame of each kind, and no other launch between the lines.
 void run_once(StreetFrame& frame) {
   const auto tell = [](const char* what, double cells) {
@@ -114,23 +100,14 @@ void run_once(StreetFrame& frame) {
 
 int run(int argc, char** argv) {
   const Arguments arguments = parse_arguments(argc, argv, kHelp, 3);
-  if (!arguments.cases.empty()) {
-    if (std::filesystem::exists(arguments.cases))
-      throw InvalidArgument("--export " + arguments.cases + ": is there: give a new folder");
-    const char* const layers = std::getenv("OPENCL_LAYERS");  // the user's stay
-    setenv("OPENCL_LAYERS", (layers && *layers ? layers + std::string(":") : "").append(CASE_LAYER).c_str(), 1);
-    setenv("EGOSGM_CACHE", "off", 1);  // a program of a binary has no source
-  }
   const shared::ImageSize size = arguments.size.value_or(shared::ImageSize{1242, 375});
   const int disparities = arguments.disparities.value_or(128);
   const Device device = Device::select();
   const Street street = make_street(size, disparities);
   Machine machine{device.info(), 0, "a synthetic street", arguments.threads, {}};
-  if (arguments.cases.empty() && !arguments.counts)
-    machine.more.emplace_back("build_s", build_s(device, street, disparities));
+  if (!arguments.counts) machine.more.emplace_back("build_s", build_s(device, street, disparities));
   ocl::Context context(device.handle().device);
   ocl::translated(context, [&] {
-    if (!arguments.cases.empty()) return write_cases(context, street, disparities, arguments.cases);
     // A tool that counts is no GPU, whatever it calls itself.
     StreetFrame frame(context, street, disparities, arguments.counts ? Scheduling::kWavefront : Scheduling::kAutomatic);
     if (arguments.counts) return run_once(frame);

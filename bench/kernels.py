@@ -4,11 +4,9 @@
 
   bench/kernels.py [--program FILE] [--json FILE] [--picture FILE.png] [--against FILE] [ARGUMENT OF egosgm_kernels]...
   bench/kernels.py --read FILE [--picture FILE.png] [--against FILE]    of what --json wrote
-  bench/kernels.py --export DIR [--program FILE] [ARGUMENT OF egosgm_kernels]...
 
 --program: build/bench/egosgm_kernels of this source unless given; EGOSGM_DEVICE chooses the device.
 --against: names what got slower than in that file by more than the spread of both, and ends with exit code 1 then.
---export: a folder with each kernel as a case that stands alone; its run.py runs them, its tune.py tries group sizes by Kernel Tuner.
 The table: a kernel's time in a frame (all its launches: median, and half of the values lie within the spread), what it moves and computes by
 kernels/costs.json, the roof that binds it, and how much of that roof it reaches. Bytes are those that its work-items ask for, so that what
 caches serve may reach more than the roof of a copy. The roof of operations is of 16 bits, so that narrower ones may reach more than it.
@@ -18,7 +16,6 @@ import argparse
 import json
 import os
 import pathlib
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -136,17 +133,11 @@ def draw(found, file):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--program", default=SOURCE / "build/bench/egosgm_kernels", type=pathlib.Path)
-    for name in ("--json", "--picture", "--against", "--read", "--export"):
+    for name in ("--json", "--picture", "--against", "--read"):
         parser.add_argument(name, type=pathlib.Path)
     given, arguments = parser.parse_known_args()
     if not given.read and not given.program.exists():
         raise SystemExit(f"kernels: {given.program}: not there: build the target egosgm_kernels, or give --program FILE")
-    if given.export:
-        subprocess.run([given.program, *arguments, "--export", given.export], check=True)
-        for file in (SOURCE / "bench/cases").glob("*.py"):
-            shutil.copy(file, given.export)
-        print(f"{len(list(given.export.glob('*/case.json')))} cases: {given.export}: python3 {given.export / 'run.py'} runs them")
-        return 0
     found = json.loads(given.read.read_text()) if given.read else measure(given.program, arguments)
     print("\n".join(table(found)))
     if given.json:

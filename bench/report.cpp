@@ -98,8 +98,6 @@ Arguments parse_arguments(int argc, char** argv, const char* help, int default_r
       arguments.json = *json;
     } else if (const auto bits = value_of("--bits", argc, argv, i)) {
       arguments.bits = *bits;
-    } else if (const auto cases = value_of("--export", argc, argv, i)) {
-      arguments.cases = *cases;
     } else if (const auto setting = value_of("--set", argc, argv, i)) {
       arguments.settings.push_back(*setting);
     } else if (rest) {

@@ -19,7 +19,6 @@ struct Arguments {
   int threads = 2;                        // --threads N: compute units of PoCL and threads of OpenCV
   std::string json;                       // --json FILE
   std::string bits;                       // --bits FILE (egosgm_stages)
-  std::string cases;                      // --export DIR (egosgm_kernels)
   bool counts = false;                    // --count (egosgm_kernels)
   std::vector<std::string> settings;      // --set NAME=VALUE, repeated (egosgm_compare)
 };

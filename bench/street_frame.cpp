@@ -32,8 +32,7 @@ double FrameTimes::device_ms() const {
                          [](double total, const auto& stage) { return total + stage.second; });
 }
 
-StreetFrame::StreetFrame(ocl::Context& context, const Street& street, int disparities, Scheduling scheduling,
-                         const std::function<void(const char*)>& begins)
+StreetFrame::StreetFrame(ocl::Context& context, const Street& street, int disparities, Scheduling scheduling)
     : context_(context),
       size_(street.size),
       motion_(street.motion),
@@ -47,13 +46,11 @@ StreetFrame::StreetFrame(ocl::Context& context, const Street& street, int dispar
   images_.pixels.write(context, street.images);
   method_.prepare(images_.type);
   method_.observer = [this](Step step) { look(step); };
-  if (begins) begins("full");
   full_range();
   belief_ = std::exchange(after_, belief_);
   belief_.maps.disparity.write(context, street.disparity);
   belief_.maps.variance.write(context, street.variance);
   belief_.evidence.fill(context, EGOSGM_EVIDENCE_MOST);
-  if (begins) begins("steady");
   steady();
 }
 

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <chrono>
-#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -31,9 +30,9 @@ struct FrameTimes {
 /// A frame of the street, as a pipeline with default options runs it, that can be run again and again.
 class StreetFrame {
  public:
-  /// Runs one of each kind. `begins`: called before each with "full" or "steady", while memory holds nothing of it yet.
+  /// Runs one of each kind.
   StreetFrame(ocl::Context& context, const Street& street, int disparities,
-              Scheduling scheduling = Scheduling::kAutomatic, const std::function<void(const char*)>& begins = {});
+              Scheduling scheduling = Scheduling::kAutomatic);
 
   const FrameTimes& steady() { return run(after_, belief_); }
   const FrameTimes& full_range();
