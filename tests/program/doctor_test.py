@@ -22,16 +22,56 @@ class Doctor(InputTest):
         self.assertIn(f" {FRAMES} pairs of ", text)
         self.assertIn(" 1 pair of ", self.assert_works("doctor", "--odometry", self.street, "--frames", "0"))
 
-    def test_values_of_8_bits_in_16(self):
-        for factor in (1, 257):
-            street = self.changed_street(lambda image: factor * image.astype(numpy.uint16), write=write_grey16)
-            said = self.assert_works("run", "--odometry", street, "--out", street.parent / "out")
-            if factor == 1:
-                self.assertIn("no value above 255", self.assert_only_problem("images", street)["text"])
-                self.assertIn("values of 8 bits in images of 16: `egosgm doctor", said)
-            else:
-                self.assertEqual(self.examine(street)["images"]["verdict"], "ok")
-                self.assertNotIn("doctor", said)
+    def test_changed_images(self):
+        """What is the only problem then, and what is said of it."""
+        def smooth(image):
+            image = image.astype(float)
+            for axis in (0, 1) * 3:
+                image = sum(numpy.roll(image, shift, axis) for shift in range(-3, 4)) / 7
+            return image
+
+        for check, words, change, *how in (
+                ("matches", "the right images are turned by 180 degrees", lambda image: image[::-1, ::-1], ["image_1"]),
+                ("matches", "the right images are upside down", lambda image: image[::-1], ["image_1"]),
+                ("matches", "coarsely, left and right agree", smooth), ("images", "", lambda image: numpy.full_like(image, 60), ["image_1"]),
+                ("images", "of nearly one tone", lambda image: image / 32), ("images", "of nearly one tone", lambda image: 0 * image)):
+            with self.subTest(check=check, words=words):
+                finding = self.assert_only_problem(check, self.changed_street(change, *how))
+                self.assertIn(words, finding["text"] + finding["remedy"])
+
+    def test_changed_images_of_which_run_tells_too(self):
+        """Of nothing where there is no problem; where a row says None, run is not asked."""
+        def mosaic(order, scale=1):
+            return lambda image: scale * numpy.clip(image * numpy.tile(order, (HEIGHT // 2, WIDTH // 2)), 0, 255)
+
+        random, same = numpy.random.default_rng(1), self.broken_street()
+        for file in (same / "image_0").iterdir():
+            shutil.copy(file, same / "image_1" / file.name)
+        chessboard = 64 * (numpy.indices((HEIGHT, WIDTH)).sum(0) % 2)
+        two_levels = self.changed_street(lambda image: numpy.where(image + chessboard + random.integers(0, 9, image.shape) > 128, 255, 0))
+        orders = ((0.45, 0.8), (0.8, 1.25)), ((0.95, 0.9), (1.0, 0.95)), ((0.8, 1.25), (0.45, 0.8))
+        colours = "mosaics of colour sensors"
+        for check, words, run_says, street in (
+                ("matches", "are the same", "images are the same", same), ("images", "2 grey levels in all", "doctor", two_levels),
+                ("images", "no value above 255", "values of 8 bits in images of 16: `egosgm doctor", self.changed_street(lambda image: image.astype(numpy.uint16), write=write_grey16)),
+                ("images", colours, colours, self.changed_street(mosaic(orders[0]))),
+                *(("images", colours, None, self.changed_street(mosaic(order))) for order in orders[1:]),
+                *(("images", colours, None, self.changed_street(mosaic(order, 200), write=write_grey16)) for order in orders),
+                (None, "", "", self.changed_street(lambda image: 257 * image.astype(numpy.uint16), write=write_grey16)),
+                (None, "", "", self.changed_street(mosaic(((1, 1.1), (1, 1.1))))), (None, "", "", self.street)):  # every other column of a sensor is brighter
+            with self.subTest(words):
+                said = run_says is not None and self.assert_works("run", street, "--out", self.new_folder() / "out") or ""
+                findings = self.examine(street, code=2 if check else 0)
+                self.assertIn(run_says or "", said)
+                if check is None:
+                    self.assertNotIn("doctor", said)
+                    self.assertEqual(findings["images"]["verdict"], "ok")
+                    continue
+                self.assertIn(words, findings[check]["text"])
+                self.assertNotIn("deinterlace", findings[check]["remedy"])
+                if words != colours:
+                    self.assertNotIn("mosaics", said + str(findings))
+                    self.assertEqual([finding["verdict"] for finding in findings.values()].count("problem"), 1, findings)
 
     def shifted(self, shift_px):
         y, x = numpy.mgrid[0:HEIGHT, 0:WIDTH]
@@ -43,7 +83,7 @@ class Doctor(InputTest):
             self.assertAlmostEqual(float(finding["text"].split()[2]), shift, delta=0.07)
             self.assertIn(f"{abs(shift):.1f} px: rectify again", finding["remedy"])
         street = self.shifted(-3)
-        alone = self.assert_only_problem("rows", "--left", street / "image_0/%06d.png", "--right", street / "image_1/%06d.png")
+        alone = self.assert_only_problem("rows", *self.patterns(street)[:4])
         self.assertIn("3.0 px: these images are not rectified: `egosgm calibrate`", alone["remedy"])
 
     def test_a_turned_camera_is_measured(self):
@@ -57,13 +97,10 @@ class Doctor(InputTest):
         self.assertIn("swapped", finding["remedy"])
 
     def test_a_calibration_of_nothing_or_of_another_scale(self):
-        street = self.broken_street()
-        f, cx, cy, baseline = self.calibration()
-        for focal, distance in ((1e-30, baseline), (f, 5e-324)):
-            (street / "calib.txt").write_text(f"fx = {focal}\nfy = {focal}\ncx = {cx}\ncy = {cy}\nbaseline_m = {distance}\n")
-            self.assert_only_problem("calibration", street)
-        (street / "calib.txt").write_text(f"fx = {2 * f}\nfy = {2 * f}\ncx = {2 * cx}\ncy = {2 * cy}\nbaseline_m = {baseline}\n")
-        self.assertIn("scale", self.assert_only_problem("calibration", street)["remedy"])
+        f, cx, cy, _ = self.calibration()
+        for changes, remedy in ((dict(fx=1e-30, fy=1e-30), ""), (dict(baseline_m=5e-324), ""), (dict(fx=2 * f, fy=2 * f, cx=2 * cx, cy=2 * cy), "scale")):
+            with self.subTest(changes):
+                self.assertIn(remedy, self.assert_only_problem("calibration", *self.patterns(calib=self.calibrated(**changes)))["remedy"])
 
     def test_a_range_that_clips_and_its_remedy(self):
         for least, too_few in ((0, 8), (-40, 45)):
@@ -77,21 +114,15 @@ class Doctor(InputTest):
 
     def test_gaps_in_time(self):
         street = self.broken_street()
-        (street / "times.txt").write_text("0\n0.1\n0.2\n0.7\n")
-        finding = self.assert_only_problem("times", street)
-        self.assertIn("0.5 s after frame 000002", finding["text"])
-        self.assertIn("--frames :2 and --frames 3:", finding["remedy"])
-        (street / "times.txt").write_text("0\n0.1\n0.05\n0.15\n")
-        self.assertIn("goes back", self.assert_only_problem("times", street)["text"])
-        (street / "times.txt").write_text("0\n0.1\n0.1\n0.2\n")
-        self.assertIn("frame 000002 has the time of the one before", self.assert_only_problem("times", street)["text"])
-        rows = [f"2011-09-{day} {clock}" for day, clock in ((30, "23:59:59.950"), (30, "23:59:59.975"))] + ["2011-10-01 00:00:00.000", "2011-10-01 00:00:00.025"]
-        (street / "times.txt").write_text("\n".join(rows))
+        for times, *named in (("0 0.1 0.2 0.7", "0.5 s after frame 000002", "--frames :2 and --frames 3:"), ("0 0.1 0.05 0.15", "goes back"),
+                              ("0 0.1 0.1 0.2", "frame 000002 has the time of the one before"), ("0 0.1", "times.txt: holds 2 times"), ("0 0.1 noon 0.3", ":3: 'noon'")):
+            (street / "times.txt").write_text(times.replace(" ", "\n") + "\n")
+            with self.subTest(times):
+                finding = self.assert_only_problem("times", street)
+                for words in named:
+                    self.assertIn(words, finding["text"] + finding["remedy"])
+        (street / "times.txt").write_text("2011-09-30 23:59:59.950\n2011-09-30 23:59:59.975\n2011-10-01 00:00:00.000\n2011-10-01 00:00:00.025\n")
         self.assertIn("0.025 s", self.examine(street)["times"]["text"])
-        (street / "times.txt").write_text("0\n0.1\n")
-        self.assertIn("times.txt: holds 2 times", self.assert_only_problem("times", street)["text"])
-        (street / "times.txt").write_text("0\n0.1\nnoon\n0.3\n")
-        self.assertIn(":3: 'noon'", self.assert_only_problem("times", street)["text"])
         (street / "times.txt").unlink()
         (street.parent / "times.txt").write_text("0\n0.1\n")  # another one's
         self.assertEqual(self.examine(street)["times"]["verdict"], "note")
@@ -108,17 +139,16 @@ class Doctor(InputTest):
         street = self.changed_street(numpy.rot90)
         found = self.examine(street, code=2)
         self.assertIn("turned by 90 degrees", found["calibration"]["text"])
-        alone = self.examine("--left", street / "image_0/*.png", "--right", street / "image_1/*.png", code=2)
+        alone = self.examine(*self.patterns(street)[:4], code=2)
         for findings in (found, alone):
             self.assertEqual([name for name in ("rows", "sides", "range", "moments") if name in findings], ["rows"])
             self.assertIn("turned by 90 degrees: turn them back", findings["rows"]["remedy"])
 
-    def test_images_of_other_moments_or_of_nothing(self):
+    def test_images_of_other_moments(self):
         street = self.broken_street()
         for file in (street / "image_1").iterdir():
             write_grey(file, numpy.random.default_rng(int(file.stem)).integers(0, 255, (HEIGHT, WIDTH)))
         self.assert_only_problem("matches", street)
-        self.assert_only_problem("images", self.changed_street(lambda image: numpy.full_like(image, 60), ["image_1"]))
 
     def test_a_camera_that_stands_still_or_is_a_frame_late(self):
         frozen = self.broken_street()
@@ -149,50 +179,6 @@ class Doctor(InputTest):
         self.assertIn("interlaced", self.assert_only_problem("images", street)["text"])
         brighter = 20 * (numpy.arange(HEIGHT) % 2)[:, None]  # as some sensors' rows are
         self.assertEqual(self.examine(self.changed_street(lambda image: numpy.clip(image + brighter, 0, 255)))["images"]["verdict"], "ok")
-
-    def test_right_images_that_are_turned(self):
-        for name, turned in (("turned by 180 degrees", numpy.s_[::-1, ::-1]), ("upside down", numpy.s_[::-1, :])):
-            street = self.changed_street(lambda image: image[turned], ["image_1"])
-            self.assertIn(f"the right images are {name}", self.assert_only_problem("matches", street)["text"])
-
-    def test_images_of_two_grey_levels_are_no_mosaics(self):
-        random = numpy.random.default_rng(1)
-        street = self.changed_street(lambda grey: numpy.where(grey + 64 * (numpy.indices(grey.shape).sum(0) % 2) + random.integers(0, 9, grey.shape) > 128, 255, 0))
-        self.assertIn("2 grey levels in all", self.assert_only_problem("images", street)["text"])
-        self.assertNotIn("mosaics", self.assert_works("run", street, "--out", self.new_folder() / "out"))
-
-    def test_mosaics_of_colour_sensors(self):
-        for order in (((0.45, 0.8), (0.8, 1.25)), ((0.95, 0.9), (1.0, 0.95)), ((0.8, 1.25), (0.45, 0.8))):
-            for scale, write in ((1, write_grey), (200, write_grey16)):
-                street = self.changed_street(lambda image: scale * numpy.clip(image * numpy.tile(order, (HEIGHT // 2, WIDTH // 2)), 0, 255), write=write)
-                found = self.examine(street, code=2)["images"]
-                self.assertIn("mosaics of colour sensors", found["text"])
-                self.assertNotIn("deinterlace", found["remedy"])
-        self.assertIn("mosaics of colour sensors", self.assert_works("run", street, "--out", self.new_folder() / "out"))
-        street = self.changed_street(lambda image: numpy.clip(image * numpy.tile((1, 1.1), WIDTH // 2), 0, 255))  # every other column of a sensor is brighter
-        self.assertNotIn("mosaics", self.assert_works("run", street, "--out", self.new_folder() / "out"))
-        self.assertNotIn("mosaics", self.assert_works("run", self.street, "--out", self.new_folder() / "out"))
-
-    def test_the_same_image_on_both_sides(self):
-        street = self.broken_street()
-        for file in (street / "image_0").iterdir():
-            shutil.copy(file, street / "image_1" / file.name)
-        self.assertIn("are the same", self.assert_only_problem("matches", street)["text"])
-        self.assertIn("images are the same", self.assert_works("run", street, "--out", self.new_folder() / "out"))
-
-    def test_images_of_nearly_one_tone(self):
-        for change in (lambda image: image / 32, lambda image: 0 * image):
-            self.assertIn("of nearly one tone", self.assert_only_problem("images", self.changed_street(change))["text"])
-
-    def test_what_is_blurred_is_not_said_to_be_of_other_moments(self):
-        def smooth(image):
-            image = image.astype(float)
-            for axis in (0, 1):
-                for _ in range(3):
-                    image = sum(numpy.roll(image, shift, axis) for shift in range(-3, 4)) / 7
-            return image
-        finding = self.assert_only_problem("matches", self.changed_street(smooth))
-        self.assertIn("coarsely, left and right agree", finding["remedy"])
 
     def test_a_pair_that_cannot_be_read_costs_itself_alone(self):
         street = self.broken_street()
@@ -230,7 +216,7 @@ class Doctor(InputTest):
         return file
 
     def test_raw_images_are_rectified_by_their_calibration(self):
-        patterns = "--left", self.street / "image_0/%06d.png", "--right", self.street / "image_1/%06d.png"
+        patterns = self.patterns()[:4]
         self.assertEqual(self.examine(*patterns, "--calib", self.raw_rig("rig.json"))["calibration"]["verdict"], "ok")
         turned = self.raw_rig("turned.json", R=rotation((1, 0, 0), 1).tolist())  # which these cameras are not
         finding = self.assert_only_problem("rows", *patterns, "--calib", turned)
@@ -239,7 +225,7 @@ class Doctor(InputTest):
 
     def test_a_calibration_may_be_a_file_for_each_camera(self):
         f, cx, cy, baseline = self.calibration()
-        patterns = "--left", self.street / "image_0/%06d.png", "--right", self.street / "image_1/%06d.png"
+        patterns = self.patterns()[:4]
         files = [self.new_folder() / name for name in ("a.yaml", "b.yaml")]  # of no names that tell the side
         for file, tx in zip(files, (0, -f * baseline)):
             camera = {"image_width": WIDTH, "image_height": HEIGHT, "k": [f, 0, cx, 0, f, cy, 0, 0, 1], "d": [0] * 5, "r": [1, 0, 0, 0, 1, 0, 0, 0, 1],
@@ -250,20 +236,14 @@ class Doctor(InputTest):
 
     def test_a_wrong_sign_hides_nothing_else(self):
         street = self.shifted(2)
-        f, cx, cy, baseline = self.calibration()
-        calib = street / "wrong.txt"
-        calib.write_text(f"fx = {f}\nfy = {f}\ncx = {cx}\ncy = {cy}\nbaseline_m = {-baseline}\n")
-        findings = self.examine("--left", street / "image_0/%06d.png", "--right", street / "image_1/%06d.png", "--calib", calib, code=2)
+        findings = self.examine(*self.patterns(street, self.calibrated(baseline_m=-self.calibration()[3])), code=2)
         self.assertEqual([name for name, finding in findings.items() if finding["verdict"] == "problem"], ["calibration", "rows"])
         self.assertIn("exchange", findings["calibration"]["remedy"])
 
     def test_wrong_arguments(self):
-        self.assert_refused(["doctor", self.street, "--samples", 0], "--samples 0")
-        self.assert_refused(["doctor", self.street, "--disparities", 0], "disparities")
-        self.assert_refused(["doctor", self.folder / "nowhere"], "nowhere")
-        self.assert_refused(["doctor", "--bag", self.folder / "nowhere"], "nowhere")
-        self.assert_refused(["doctor", self.street, "--bag", self.folder], "one input")
-        self.assert_refused(["doctor", self.street, "--left-topic", "/left"], "--bag FILE")
+        self.assert_all_refused((
+            ("doctor {street} --samples 0", "--samples 0"), ("doctor {street} --disparities 0", "disparities"), ("doctor {never}", "{never}"),
+            ("doctor --bag {never}", "{never}"), ("doctor {street} --bag {street}", "one input"), ("doctor {street} --left-topic /left", "--bag FILE")))
 
 
 @unittest.skipUnless(DATA and pathlib.Path(DATA).is_dir(), "no real data")

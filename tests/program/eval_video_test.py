@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 """egosgm eval-video."""
-import json
 import shutil
 import struct
 
@@ -14,7 +13,7 @@ def constant_png(value, width=WIDTH, height=HEIGHT):
 
 class EvalOverTime(ProgramTest):
     def evaluate(self, *arguments):
-        return json.loads(self.assert_works("eval-video", *arguments, "--json"))
+        return self.json_of("eval-video", *arguments)
 
     def maps(self, values, write=constant_png, suffix="png"):
         folder = self.new_folder()
@@ -102,8 +101,7 @@ class EvalOverTime(ProgramTest):
         self.assertRegex(self.assert_works("eval-video", estimate, truth, "--against", against), r"lost_right_percent +66\.6667")
 
     def test_reasons_of_a_run_tell_what_was_trusted(self):
-        out, truth = self.new_folder() / "out", self.street / "truth/left_disp_noc"
-        self.assert_works("run", "--odometry", self.street, "--out", out, "--write", "reason", "--quiet")
+        out, truth = self.ran(self.street, "--write", "reason"), self.street / "truth/left_disp_noc"
         figures = self.evaluate(out, truth)["figures"]
         self.assertLess(figures["wrong_of_trusted_percent"], 5)
         self.assertEqual(self.evaluate(out / "disparity", truth)["figures"], figures)
@@ -121,9 +119,7 @@ class EvalOverTime(ProgramTest):
             self.assertEqual(figures["tepe_dynamicstereo_px"], 0.5)
 
     def test_variance_and_confidence_are_opposite_orders(self):
-        out = self.new_folder()
-        self.assert_works("run", "--odometry", self.street, "--out", out, "--write", "variance", "--quiet")
-        truth = self.street / "truth/left_disp_noc"
+        out, truth = self.ran(self.street, "--write", "variance"), self.street / "truth/left_disp_noc"
         result = self.evaluate(out, truth, "--variance", out)
         wrong_way = self.evaluate(out, truth, "--confidence", out / "variance")
         self.assertGreater(wrong_way["figures"]["ause_px"], 2 * result["figures"]["ause_px"])
@@ -140,32 +136,24 @@ class EvalOverTime(ProgramTest):
         self.assert_works("eval-video", estimate, truth, "--plot-frames", out / "frames.svg", "--variance", estimate, "--plot-density", out / "density.png")
         self.assertIn("TEPE same pixel", (out / "frames.svg").read_text())
         self.assertTrue((out / "density.png").read_bytes().startswith(b"\x89PNG"))
-        self.assert_refused(["eval-video", estimate, truth, "--plot-frames", out / "frames.gif"], "--plot-frames", ".svg")
-        self.assert_refused(["eval-video", estimate, truth, "--plot-density", out / "none.svg"], "--plot-density", "belongs to --variance or --confidence")
-        self.assert_refused(["eval-video", estimate, truth, "--next-truth", truth], "--next-truth", "belongs to --flow")
-        plain = self.new_folder() / "plain"
-        shutil.copytree(self.street, plain, ignore=shutil.ignore_patterns("truth"))
-        self.assert_refused(["eval-video", estimate, "--sequence", plain, "--mask", truth], "--mask", "belongs to --truth")
-        self.assertFalse((out / "none.svg").exists())
 
     def test_wrong_input_gives_one_line_and_no_table(self):
-        truth = self.street / "truth/left_disp_occ"
-
-        def refused(arguments, *named):
-            self.assert_refused(["eval-video", *arguments], *named)
-        refused(["--estimate", truth], "no truth")
-        refused([truth, truth, "--poses", self.street / "poses.txt"], "--sequence")
-        refused([truth, truth, "--variance", truth, "--confidence", truth], "give one of them")
-        refused([truth, truth, "--against", self.new_folder()], "holds no")
-        refused([truth, truth, "--scale", "0"], "positive")
-        other = self.new_folder()
+        truth, same, empty, other, small, plain = f"{self.street}/truth/left_disp_occ", self.maps([10, 10, 10]), *(self.new_folder() / "d" for _ in range(4))
+        for folder in (empty, other, small):
+            folder.mkdir()
+        shutil.copytree(self.street, plain, ignore=shutil.ignore_patterns("truth"))
         for name in ("000001.png", "000077.png"):
-            shutil.copy(truth / "000001.png", other / name)
-        refused([other, "--sequence", self.street], "000077.png", "no frame of this number")
-        small = self.maps([1, 1])
+            shutil.copy(f"{truth}/000001.png", other / name)
         (small / "000001.png").write_bytes(grey_png(20, 10, depth=16))
-        refused([truth, truth, "--against", small], "000001.png", "20x10", "320x96")
         broken = self.maps([1, 1, 1, 1])
         (broken / "000003.png").write_bytes(constant_png(1)[:100])
-        refused([broken, truth], "000003.png")
-        refused([truth, truth, "--flow", truth], "000000.png", "optical flow")
+        self.assert_all_refused((
+            (f"--estimate {truth}", "no truth"), (f"{truth} {truth} --poses {{street}}/poses.txt", "--sequence"),
+            (f"{truth} {truth} --variance {truth} --confidence {truth}", "give one of them"), (f"{truth} {truth} --against {empty}", "holds no"),
+            (f"{truth} {truth} --scale 0", "positive"), (f"{other} --sequence {{street}}", "000077.png", "no frame of this number"),
+            (f"{truth} {truth} --against {small}", "000001.png", "20x10", "320x96"), (f"{broken} {truth}", "000003.png"),
+            (f"{truth} {truth} --flow {truth}", "000000.png", "optical flow"), (f"{same} {same} --plot-frames {{never}}.gif", "--plot-frames", ".svg"),
+            (f"{same} {same} --plot-density {{never}}.svg", "--plot-density", "belongs to --variance or --confidence"),
+            (f"{same} {same} --next-truth {same}", "--next-truth", "belongs to --flow"),
+            (f"{same} --sequence {plain} --mask {same}", "--mask", "belongs to --truth")), ["eval-video"])
+        self.assertFalse((self.folder / "never.svg").exists())

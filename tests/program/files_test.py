@@ -51,9 +51,6 @@ class InputFiles(FilesTest):
             self.assert_refused_and_untouched(user, ["run", "--left", "left/%06d.png", "--right", "right/%06d.png", "--calib", "calib.toml",
                                                      "--out", ".", *how], named, cwd=user)
 
-    def test_only_a_run_is_one_to_go_on_with_or_to_remove(self):
-        self.assertTrue(egosgm("run", self.street, "--out", self.street).stderr.endswith("is not empty: give a new folder\n"))
-
     def test_a_home_folder_that_cannot_be_looked_into(self):
         env = {name: value for name, value in os.environ.items() if not name.startswith("XDG_")}
         kept = os.path.join(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "pocl/kcache")  # PoCL's own place
@@ -63,11 +60,11 @@ class InputFiles(FilesTest):
 
     def test_a_sequence_keeps_its_truth_and_may_hold_results(self):
         street = self.broken_street()
-        for out in (street, street / "truth", street / "image_0"):
-            self.assert_refused_and_untouched(street, ["run", "--odometry", street, "--out", out, *METHOD], "is not empty")
-        self.assert_refused_and_untouched(street, ["odometry", street, "--out", street / "poses.txt"], "poses.txt", "is there already")
-        self.assert_refused_and_untouched(street, ["odometry", street, "--out", street / "image_0/000000.png"], "is there already")
         before = state(street)
+        self.assert_all_refused((
+            *((f"run {street} --out {out}", "is not empty: give a new folder") for out in (street, street / "truth", street / "image_0")),
+            *((f"odometry {street} --out {street}/{file}", file, "is there already") for file in ("poses.txt", "image_0/000000.png"))))
+        self.assertEqual(state(street), before)
         self.assert_works("run", "--odometry", street, "--out", street / "results", "--frames", "0", *METHOD)
         self.assertLess(before.items(), state(street).items())
         self.assertTrue(self.report(street / "results")["finished"])
@@ -113,33 +110,16 @@ class InputFiles(FilesTest):
 
 
 class CameMeanwhile(FilesTest):
-    """What others put there while a command works stays."""
-
-    def assert_stays(self, name, *command):
-        out = self.new_folder() / name
-        process = self.started(*command, out)
-        out.parent.mkdir(exist_ok=True)
-        out.write_text("mine")
-        _, errors = process.communicate(timeout=900)
-        self.assertEqual((process.returncode, out.read_text()), (1, "mine"), errors)
-        self.assertIn("has come there meanwhile, and stays", errors)
-        self.assertEqual(sorted(file.name for file in out.parent.iterdir()), [out.name])
-
-    def test_poses(self):
-        self.assert_stays("poses.txt", "odometry", self.street, "--out")
-
-    def test_images(self):
-        out = self.new_folder() / "street"
-        process = self.started("synth", "--frames", 9, "--width", 32, "--height", 16, "--out", out)
-        (out / "image_0/000008.png").write_text("mine")
-        _, errors = process.communicate(timeout=900)
-        self.assertEqual(process.returncode, 1, errors)
-        self.assertIn("image_0/000008.png: has come there meanwhile, and stays", errors)
-        self.assertEqual((out / "image_0/000008.png").read_text(), "mine")
-
-    def test_a_stream_is_written_through(self):
-        written = self.assert_works("odometry", self.street, "--quiet", "--out", "/dev/stdout")
-        self.assertEqual(len(written.splitlines()), 4)
+    def test_what_others_put_there_while_a_command_works_stays(self):
+        for name, command in (("", ["odometry", self.street]), ("image_0/000008.png", ["synth", "--frames", 9, "--width", 32, "--height", 16])):
+            out = self.new_folder() / "out"
+            process = self.started(*command, "--out", out)
+            (out / name).write_text("mine")
+            _, errors = process.communicate(timeout=900)
+            with self.subTest(command[0]):
+                self.assertEqual((process.returncode, (out / name).read_text()), (1, "mine"), errors)
+                self.assertIn(f"{out / name}: has come there meanwhile, and stays", errors)
+                self.assertEqual(list(out.parent.iterdir()), [out])
 
 
 class OwnFiles(FilesTest):
@@ -199,38 +179,20 @@ class OwnFiles(FilesTest):
                 out = self.new_folder()
                 with self.subTest(name=name, option=option):
                     self.assert_refused_and_untouched(out, ["run", "--odometry", self.street, *METHOD, "--out", out, option, out / name], option)
-        folder = self.new_folder()
-        for option in ("--trace", "--save-config"):
-            for name in ("new", "new/out", "new/./out", "new/out/../out"):
-                self.assert_refused_and_untouched(folder, ["run", "--odometry", self.street, *METHOD, "--out", folder / "new/out", option, f"{folder}/{name}"], "is a folder")
-        for command in (["odometry", self.street, "--out"], ["compile", "--out", folder / "out", "--save-config"], ["tune", "--file"]):
-            self.assert_refused_and_untouched(folder, [*command, f"{folder}/new/"], "is a folder: give the name of a file")
-        for command in (["compile", "--out"],):
-            for name in ("new", "new/out"):
-                self.assert_refused_and_untouched(folder, [*command, folder / "new/out", "--save-config", folder / name], "or is that folder")
-        self.assertFalse((folder / "new").exists())
         out = self.new_folder()
-        self.assert_refused_and_untouched(out, ["run", "--odometry", self.street, *METHOD, "--out", out, "--trace", out / "a", "--save-config", f"{out}/./a"],
-                                          "another option")
+        rows = [(f"run {{street}} --out {{never}}/out {option} {{never}}{name}", "is a folder")
+                for option in ("--trace", "--save-config") for name in ("", "/out", "/./out", "/out/../out")]
+        rows += [(f"{command} {{never}}/", "is a folder: give the name of a file") for command in ("odometry {street} --out", f"compile --out {out} --save-config", "tune --file")]
+        rows += [(f"compile --out {{never}}/out --save-config {{never}}{name}", "or is that folder") for name in ("", "/out")]
+        rows += [(f"compile --out {out} --save-config {out}/manifest.json", "lies in"),
+                 (f"run {{street}} --out {out} --trace {out}/a --save-config {out}/./a", "another option")]
+        self.assert_all_refused(rows)
+        self.assertEqual(list(out.iterdir()), [])
 
     def test_a_page_is_not_replaced(self):
-        out = self.new_folder()
-        self.run_into(out)
+        out = self.ran(self.street, "--frames", 0, *METHOD)
         self.assert_works("report", out)
         self.assert_refused_and_untouched(out, ["report", out], "report.html", "is there already")
-
-
-class SavedElsewhere(FilesTest):
-    def test_the_configuration_is_saved_elsewhere(self):
-        out = self.new_folder() / "out"
-        out.mkdir()
-        self.assert_refused_and_untouched(out.parent, ["compile", "--out", out, "--save-config", out / "manifest.json"], "lies in")
-
-    def test_a_comment_begins_after_a_blank(self):
-        folder = self.new_folder()
-        shutil.copytree(self.street, folder / "drive#2")
-        (folder / "pairs").write_text("drive#2/image_0/000000.png drive#2/image_1/000000.png # the first\n")
-        self.assert_works("rectify", "--list", folder / "pairs", "--calib", self.street / "calib.txt", "--out", self.new_folder() / "out", "--quiet")
 
 
 class Streams(FilesTest):

@@ -39,6 +39,14 @@ class InputTest(ProgramTest):
         left, right = ([float(number) for number in rows[name].split()] for name in ("P0", "P1"))
         return left[0], left[2], left[6], (left[3] - right[3]) / left[0]  # f, cx, cy, baseline
 
+    def calibrated(self, **changes):
+        """calib.txt with values that are changed."""
+        f, cx, cy, baseline = self.calibration()
+        file = self.new_folder() / "calib.txt"
+        values = {"fx": f, "fy": f, "cx": cx, "cy": cy, "baseline_m": baseline, **changes}
+        file.write_text("".join(f"{name} = {value}\n" for name, value in values.items()))
+        return file
+
     def changed_street(self, change, sides=("image_0", "image_1"), write=write_grey):
         """One whose images are `change` of what they were."""
         street = self.broken_street()

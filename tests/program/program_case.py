@@ -11,6 +11,7 @@ import json
 import os
 import pathlib
 import re
+import shlex
 import shutil
 import signal
 import stat
@@ -161,6 +162,11 @@ class ProgramTest(unittest.TestCase):
         shutil.copytree(self.street, copy)
         return copy
 
+    def patterns(self, street=None, calib=None):
+        """The images of a sequence by their patterns, with a calibration: the sequence's own, unless another one is named."""
+        street = street or self.street
+        return ["--left", street / "image_0/%06d.png", "--right", street / "image_1/%06d.png", "--calib", calib or street / "calib.txt"]
+
     def without_package(self):
         """A copy of the program beside which there is no package, and the environment that it runs in."""
         loaded = subprocess.run([PROGRAM], env={**os.environ, "LD_TRACE_LOADED_OBJECTS": "1"}, capture_output=True, text=True, check=True).stdout
@@ -186,6 +192,23 @@ class ProgramTest(unittest.TestCase):
         self.assertEqual(done.stderr, "")
         return done.stdout
 
+    def ran(self, *arguments, **options):
+        """The new folder of a run, which works."""
+        out = self.new_folder() / "out"
+        self.assert_works("run", *arguments, "--out", out, **options)
+        return out
+
+    def json_of(self, *arguments):
+        return json.loads(self.assert_works(*arguments, "--json"))
+
+    def assert_same_files(self, folder, expected, *patterns):
+        """All files of `expected` that the patterns name are in `folder`, with the same bytes."""
+        for pattern in patterns:
+            files = sorted(expected.glob(pattern))
+            self.assertTrue(files, pattern)
+            for file in files:
+                self.assertEqual((folder / file.relative_to(expected)).read_bytes(), file.read_bytes(), file.name)
+
     def assert_refused(self, arguments, *named, code=2, **options):
         """One line on the standard error that holds every text of `named`, and the exit code."""
         needs_package(self, arguments)
@@ -196,6 +219,16 @@ class ProgramTest(unittest.TestCase):
         self.assertTrue(lines[0].startswith("egosgm: error: "), lines[0])
         for text in named:
             self.assertIn(str(text), lines[0])
+
+    def assert_all_refused(self, rows, start=(), end=(), **options):
+        """Rows of a command line's words, as a list or as text, and of what the refusal says. {street} is the sequence, {never} a folder that is
+        not there before and after."""
+        places = {"street": self.street, "never": self.folder / "never"}
+        for words, *named in rows:
+            words = shlex.split(words.format(**places)) if isinstance(words, str) else words
+            with self.subTest(" ".join(map(str, words))):
+                self.assert_refused([*start, *words, *end], *(str(text).format(**places) for text in named), **options)
+                self.assertFalse(places["never"].exists(), "refused, but wrote")
 
     def assert_refused_and_untouched(self, folder, arguments, *named, code=2, **options):
         before = state(folder)

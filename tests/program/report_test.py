@@ -51,6 +51,12 @@ class ReportTest(ProgramTest):
     def works(cls, *arguments):
         return ProgramTest.assert_works(cls("id"), *arguments)
 
+    def copy_of_the_run(self):
+        """Without its page."""
+        copy = self.new_folder() / "copy"
+        shutil.copytree(self.out, copy, ignore=shutil.ignore_patterns("report.html"))
+        return copy
+
     def data(self, page):
         return json.loads(Elements(page.read_text()).texts["data"])
 
@@ -59,26 +65,19 @@ class Report(ReportTest):
     def test_the_page_names_no_folder_of_this_machine(self):
         self.assertNotIn(str(self.folder), self.page.read_text())
         self.assertEqual(self.data(self.page)["run"]["frames"][0]["left"], "image_0/000000.png")
-        out = self.new_folder() / "out"
-        self.works("run", "--left", self.street / "image_0/%06d.png", "--right", self.street / "image_1/%06d.png", "--calib",
-                   self.street / "calib.txt", "--out", out, "--quiet", "--disparities", 64, "--poses", self.street / "poses.txt")
+        out = self.ran(*self.patterns(), "--disparities", 64, "--poses", self.street / "poses.txt")
         self.works("report", out)
         self.assertNotIn(str(self.folder), (out / "report.html").read_text())
 
     def test_json_that_is_nested_too_deep_or_has_too_many_keys_is_one_line(self):
-        out = self.new_folder() / "out"
-        shutil.copytree(self.out, out)
+        out = self.copy_of_the_run()
         report = out / "report.json"
-        (out / "report.html").unlink()
         text = report.read_text().rstrip().removesuffix("}")
         resume = ["run", "--odometry", self.street, "--out", out, "--resume", "--quiet", "--set", "p2=150", "--disparities", 64]
-        for extra, named in (('"x": ' + "[" * 200_000 + "]" * 200_000, "nested deeper than 64"),
-                             ('"x": ' + "[" * 64 + "]" * 64, "nested deeper than 64"),
-                             ('"x": ' + '{"a":' * 200_000 + "1" + "}" * 200_000, "nested deeper than 64"),
-                             ('"x": {' + ",".join(f'"k{i}": 0' for i in range(200_000)) + "}", "more than 2000 keys")):
-            report.write_text(text + ", " + extra + "}")
-            self.assert_refused(["report", out], "report.json", named)
-            self.assert_refused(resume, "report.json", named)
+        for extra, named in (("[" * 64 + "]" * 64, "nested deeper than 64"), ('{"a":' * 200_000 + "1" + "}" * 200_000, "nested deeper than 64"),
+                             ("{" + ",".join(f'"k{i}": 0' for i in range(200_000)) + "}", "more than 2000 keys")):
+            report.write_text(f'{text}, "x": {extra}}}')
+            self.assert_all_refused(((command, "report.json", named) for command in (["report", out], resume)))
         report.write_text(text + ', "x": ' + "[" * 60 + "]" * 60 + "}")
         self.works("report", out)
 
@@ -97,20 +96,16 @@ class Report(ReportTest):
         self.assertEqual(some["run"]["frames"], whole["run"]["frames"][1:3])
         self.assertEqual([picture["frame"] for picture in some["pictures"]], [1, 2])
         self.assertEqual(some["metrics"], {number: whole["metrics"][number] for number in ("1", "2")})
-        own = json.loads(self.assert_works("eval", self.out, self.street / "truth/left_disp_noc", "--frames", "1:2", "--json"))
-        self.assertEqual(some["pooled"], own["pooled"])
+        self.assertEqual(some["pooled"], self.json_of("eval", self.out, self.street / "truth/left_disp_noc", "--frames", "1:2")["pooled"])
         self.assertEqual((len(some["path"]), len(some["true_path"])), (2, 2))
         step = [[b - a for a, b in zip(*data["path"][first:first + 2])] for data, first in ((some, 0), (whole, 1))]
         for mine, own in zip(*step):  # each is seen from its first camera, which turns little
             self.assertAlmostEqual(mine, own, delta=0.05)
-        self.assert_refused(["report", self.out, "--frames", f"{FRAMES}:"], f"--frames {FRAMES}:", f"from 0 to {FRAMES - 1}")
-        self.assert_refused(["report", self.out, "--frames", "some"], "FIRST:LAST")
-        self.assert_refused(["report", self.out, "--frames", "1:2", "--pictures", "3", "--out", self.folder / "never.html"], "--pictures", "from 1 to 2")
 
     def test_what_moves_is_a_layer(self):
-        street, out = self.new_folder() / "street", self.new_folder() / "out"
+        street = self.new_folder() / "street"
         self.assert_works("synth", "--out", street, "--frames", 3, "--width", 480, "--height", 180, "--seed", 3, "--moving-object", "--quiet")
-        self.assert_works("run", street, "--poses", street / "poses.txt", "--out", out, "--write", "objects", "--quiet", "--disparities", 64)
+        out = self.ran(street, "--poses", street / "poses.txt", "--write", "objects", "--disparities", 64)
         self.assert_works("report", out)
         pictures = self.data(out / "report.html")["pictures"]
         self.assertEqual([[layer["name"] for layer in picture["layers"]] for picture in pictures],
@@ -140,7 +135,7 @@ class Report(ReportTest):
         for frame in run["frames"]:
             frame["left"] = "/".join(pathlib.Path(frame["left"]).parts[-2:])
         self.assertEqual(data["run"], run)
-        own = json.loads(self.assert_works("eval", "--estimate", self.out, "--truth", self.street / "truth/left_disp_noc", "--json"))
+        own = self.json_of("eval", self.out, self.street / "truth/left_disp_noc")
         self.assertEqual(data["pooled"], own["pooled"])
         self.assertEqual([data["metrics"][str(i)]["bad_or_missing"] for i in range(FRAMES)],
                          [pair["bad_or_missing"] for pair in own["pairs"]])
@@ -176,7 +171,7 @@ class Report(ReportTest):
         shutil.copy(self.street / "calib.txt", kitti / "calib/000007.txt")
         self.assert_works("run", "--kitti", kitti, "--scene", 7, "--disparities", 48, "--out", out, "--quiet")
         for truth in (kitti, kitti / "disp_noc", kitti / "disp_noc/000007_10.png"):
-            own = json.loads(self.assert_works("eval", "--estimate", out, "--truth", truth, "--json"))
+            own = self.json_of("eval", out, truth)
             self.assertEqual([pair["truth"] for pair in own["pairs"]], [str(kitti / "disp_noc/000007_10.png")])
             page = self.new_folder() / "page.html"
             self.assert_works("report", out, "--truth", truth, "--out", page)
@@ -191,8 +186,7 @@ class Report(ReportTest):
         self.assertEqual(len(self.data(page.parent / "whole.html")["metrics"]), FRAMES)
 
     def test_a_run_of_which_little_is_left(self):
-        copy = self.new_folder() / "copy"
-        shutil.copytree(self.out, copy)
+        copy = self.copy_of_the_run()
         for folder in ("variance", "search"):
             shutil.rmtree(copy / folder)
         report = self.report(copy)
@@ -201,7 +195,6 @@ class Report(ReportTest):
             frame["left"] = "/nonexistent/left.png"
         (copy / "report.json").write_text(json.dumps(report))
         (copy / "poses.txt").unlink()
-        (copy / "report.html").unlink()
         self.assert_works("report", copy)
         data = self.data(copy / "report.html")
         self.assertEqual(data["run"]["input"], report["input"])
@@ -209,13 +202,13 @@ class Report(ReportTest):
         self.assertEqual(len(data["notes"]), 4)
 
     def test_what_is_no_run_is_refused(self):
-        copy = self.new_folder() / "copy"
-        shutil.copytree(self.out, copy)
+        copy = self.copy_of_the_run()
         report = self.report(copy)
         self.assert_refused(["report", self.street], "report.json", "egosgm run")
-        self.assert_refused(["report", self.out, "--pictures", "0,17", "--out", self.folder / "never.html"], '"17"', "from 0 to 3")
-        self.assert_refused(["report", self.out, "--picture-width", 1], "--picture-width 1")
-        self.assert_refused(["report", self.out, "--truth", self.street / "image_0/calib", "--out", self.folder / "never.html"], "image_0/calib")
+        self.assert_all_refused((
+            ("--pictures 0,17", '"17"', "from 0 to 3"), ("--picture-width 1", "--picture-width 1"), ("--truth {street}/image_0/calib", "image_0/calib"),
+            (f"--frames {FRAMES}:", f"--frames {FRAMES}:", f"from 0 to {FRAMES - 1}"), ("--frames some", "FIRST:LAST"),
+            ("--frames 1:2 --pictures 3", "--pictures", "from 1 to 2")), ["report", self.out, "--out", self.folder / "never"])
         for text in ("[]", "{", json.dumps({**report, "frames": []}), json.dumps({**report, "frames": [7]}), json.dumps({**report, "options": 3})):
             (copy / "report.json").write_text(text)
             self.assert_refused(["report", copy], copy / "report.json")
@@ -223,7 +216,6 @@ class Report(ReportTest):
             (copy / "report.json").write_text(text)
             self.assert_refused(["report", copy], copy / "report.json", "is no JSON")
         (copy / "report.json").write_text(json.dumps(report))
-        (copy / "report.html").unlink()
         (copy / "disparity/000003.png").unlink()
         self.assert_refused(["report", copy], "disparity/000003.png")
 
@@ -310,6 +302,11 @@ class ReportInBrowser(ReportTest):
         self.assertEqual(self.browser.errors(), [])
         self.assertEqual({url.split(":")[0] for url in self.browser.requests()} - {"file", "data"}, set())
 
+    def place_of_the_stage(self):
+        """Its left, top, width and height, in view."""
+        return self.browser.evaluate("(() => { document.getElementById('stage').scrollIntoView(); "
+                                     "const b = document.getElementById('stage').getBoundingClientRect(); return [b.x, b.y, b.width, b.height] })()")
+
     def test_charts_slider_and_layers(self):
         browser = self.browser
         browser.open(self.page)
@@ -325,8 +322,7 @@ class ReportInBrowser(ReportTest):
         loaded = "(async () => { for (const id of ['above', 'below']) await document.getElementById(id).decode(); " \
                  "return ['above', 'below'].map(id => document.getElementById(id).naturalWidth) })()"
         self.assertEqual(browser.evaluate(loaded), [WIDTH, WIDTH])
-        box = browser.evaluate("(() => { document.getElementById('stage').scrollIntoView(); "
-                               "const b = document.getElementById('stage').getBoundingClientRect(); return [b.x, b.y, b.width, b.height] })()")
+        box = self.place_of_the_stage()
         self.assertAlmostEqual(box[3] / box[2], HEIGHT / WIDTH, delta=0.01)
         split = lambda: (browser.evaluate("document.getElementById('split').value"), browser.evaluate("document.getElementById('above').style.clipPath"))
         self.assertEqual(split(), ("50", "inset(0px 50% 0px 0px)"))
@@ -355,8 +351,7 @@ class ReportInBrowser(ReportTest):
         self.browser.open(self.page)
         name, run = f"{FRAMES - 1:06d}", self.report(self.out)
         maps = {kind: cv2.imread(str(next((self.out / kind).glob(name + ".*"))), cv2.IMREAD_UNCHANGED) for kind in ("disparity", "variance", "reason")}
-        box = self.browser.evaluate("(() => { document.getElementById('stage').scrollIntoView(); "
-                                    "const b = document.getElementById('stage').getBoundingClientRect(); return [b.x, b.y, b.width, b.height] })()")
+        box = self.place_of_the_stage()
         places = [(10 + 30 * i, 5 + 9 * i) for i in range(10)]
         places.append(next((x, y) for y in range(HEIGHT) for x in range(WIDTH) if not maps["disparity"][y, x]))
         camera, reasons = run["calibration"], run["reasons"]
@@ -379,9 +374,7 @@ class ReportInBrowser(ReportTest):
         self.assert_no_errors()
 
     def test_a_warning_and_its_remedy_stand_apart(self):
-        out = self.new_folder() / "out"
-        shutil.copytree(self.out, out)
-        (out / "report.html").unlink()
+        out = self.copy_of_the_run()
         report = self.report(out)
         report["warning"] = "density 24 % in the mean, 62 % of the image is nearer than the range (--disparities 128), the principal point is far (cx 1, cy 2) (scale fx, fy), a baseline of 3 m (few are wider, and is it in decimetres (0.3 m)?); poses in another order"
         report["notes"] = ["1 left image has no partner"]
@@ -400,8 +393,7 @@ class ReportInBrowser(ReportTest):
         self.assert_no_errors()
 
     def test_a_short_run_without_truth(self):
-        out = self.new_folder()
-        self.assert_works("run", "--odometry", self.street, "--frames", "1", "--out", out, "--quiet", "--disparities", 64)
+        out = self.ran(self.street, "--frames", "1", "--disparities", 64)
         self.assert_works("report", out)
         self.browser.open(out / "report.html")
         self.assertEqual(self.browser.evaluate("document.querySelectorAll('.note').length"), 3)

@@ -2,6 +2,7 @@
 """Runs that end early: full disks, interrupts, kills; and runs that go on or are replaced."""
 import json
 import os
+import pathlib
 import resource
 import shutil
 import signal
@@ -38,10 +39,7 @@ class Disk(LongRuns):
     def test_output_folders_that_cannot_be_written(self):
         file = self.new_folder() / "file"
         file.touch()
-        below_a_file = file / "out"
-        self.assert_refused(["run", "--odometry", self.street, "--out", below_a_file], below_a_file, code=1)
-        self.assert_refused(["synth", "--out", below_a_file], below_a_file, code=1)
-        self.assert_refused(["odometry", self.street, "--out", below_a_file / "poses.txt"], below_a_file, code=1)
+        self.assert_all_refused(((f"{command} --out {file}/out", file) for command in ("run {street}", "synth", "odometry {street}")), code=1)
 
     def test_a_full_disk_leaves_whole_files(self):
         street, out = self.long_street(), self.new_folder()
@@ -98,16 +96,6 @@ class Disk(LongRuns):
         self.assertEqual((process.returncode, errors), (130, "egosgm: interrupted\n"))
         self.assertFalse(out.exists())
 
-    def test_a_kill_leaves_only_whole_files(self):
-        street = self.long_street()
-        for lines in (1, 2, 3):
-            out = self.new_folder()
-            process = self.start(street, out, lines=lines)
-            process.kill()
-            process.communicate()
-            self.assert_whole(out, at_least=lines)
-            self.assertFalse(self.report(out)["finished"])
-
     def assert_leaves_out(self, broken, *named):
         """A run over a long sequence whose last pair `broken(street)` breaks while it runs."""
         street, out = self.long_street(), self.new_folder()
@@ -138,14 +126,11 @@ class Disk(LongRuns):
             self.assert_refused(["run", "--odometry", street, "--out", out, "--resume"], name, code=2)
             self.assertEqual((out / name).read_text(), "mine")
 
-    def test_a_file_that_vanishes(self):
-        last = f"image_1/{self.LONG - 1:06d}.png"
-        self.assert_leaves_out(lambda street: (street / last).unlink(), last, "cannot be read")
-
-    def test_a_file_that_changes_size_or_is_cut(self):
+    def test_a_file_that_vanishes_changes_size_or_is_cut(self):
         last = f"image_0/{self.LONG - 1:06d}.png"
-        self.assert_leaves_out(lambda street: (street / last).write_bytes(grey_png(WIDTH, HEIGHT + 1)), last)
-        self.assert_leaves_out(lambda street: os.truncate(street / last, 1000), last, "truncated")
+        for words, breaks in (("cannot be read", pathlib.Path.unlink), ("", lambda file: file.write_bytes(grey_png(WIDTH, HEIGHT + 1))), ("truncated", lambda file: os.truncate(file, 1000))):
+            with self.subTest(words):
+                self.assert_leaves_out(lambda street: breaks(street / last), last, words)
 
     def cut_short(self, *arguments, lines=1):
         """The program's exit code and standard error where the reader of its standard output goes after some lines."""
@@ -168,8 +153,7 @@ class Disk(LongRuns):
         self.assertEqual(self.cut_short("synth", "--out", folder / "synth", "--frames", 3, "--width", 64, "--height", 48), (0, ""))
         self.assertTrue((folder / "synth/poses.txt").exists())
         if HAS_PACKAGE:
-            self.assertEqual(self.cut_short("rectify", "--left", f"{street}/image_0/*.png", "--right", f"{street}/image_1/*.png", "--calib",
-                                            street / "calib.txt", "--out", folder / "rectified"), (0, ""))
+            self.assertEqual(self.cut_short("rectify", *self.patterns(), "--out", folder / "rectified"), (0, ""))
             self.assertEqual(len(list((folder / "rectified/image_0").iterdir())), FRAMES)
             self.assertTrue((folder / "rectified/calib.txt").exists())
         for command in (["eval", "--estimate", out, "--truth", self.street / "truth/left_disp_noc"], ["run", "--help"], ["devices"]):
@@ -219,6 +203,7 @@ class Killed(LongRuns):
         process = self.start(street, out, "--write", "variance", lines=3)
         process.kill()
         process.communicate()
+        self.assertFalse(self.report(out)["finished"])
         (out / "notes.txt").write_text("mine")
         run = ["run", "--odometry", street, "--out", out, "--write", "variance"]
         self.assert_refused_and_untouched(out, run, out, "is not empty", "--resume", "removed by hand")
@@ -245,9 +230,7 @@ class Fallback(LongRuns):
 
     def test_another_device_goes_on_with_the_same_bits(self):
         run = ["run", "--odometry", self.street, "--disparities", 32, "--write", "variance", "--quiet", "--out"]
-        expected = self.new_folder()
-        self.assert_works(*run, expected)
-        maps = {file.relative_to(expected): file.read_bytes() for file in expected.rglob("0*.*")}
+        expected = self.ran(*run[1:-1])
         last = self.commands_of_a_run(run)
         for command in (0, last // 2, last * 3 // 4, last):
             out, trace = self.new_folder(), self.new_folder() / "trace.json"
@@ -257,8 +240,7 @@ class Fallback(LongRuns):
             done = egosgm(*run, out, "--fallback", "cpu", "--trace", trace, env=self.lost_at(command))
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertRegex(done.stderr, r"^egosgm: .* failed \(.*CL_DEVICE_NOT_AVAILABLE.*\): .* goes on\n$")
-            self.assertEqual({file.relative_to(out): file.read_bytes() for file in out.rglob("0*.*")}, maps)
-            self.assertEqual((out / "poses.txt").read_bytes(), (expected / "poses.txt").read_bytes())
+            self.assert_same_files(out, expected, "**/0*.*", "poses.txt")
             report = self.report(out)
             self.assertTrue(report["finished"])
             self.assertEqual(report["fallback"]["from"], report["device"])
@@ -324,40 +306,33 @@ class Resume(LongRuns):
         broken(lambda: poses.write_text("\n".join([rows[0], rows[2], rows[1], rows[3]]) + "\n"))
         broken(lambda: shutil.copy(street / "image_0/000002.png", street / "image_0/000001.png"))
 
-    def assert_fewer_frames_change_nothing(self, *run, first_map):
-        out = self.new_folder()
-        run = ["run", *run, "--disparities", 16, "--out", out, "--quiet"]
-        self.assert_works(*run)
-        self.assert_refused_and_untouched(out, [*run, "--frames", "0:1", "--resume"], "--resume", f"disparity/{first_map}", "give the frames", "another --out")
-
     def test_fewer_frames_leave_the_run_as_it_is(self):
-        self.assert_fewer_frames_change_nothing("--odometry", self.street, first_map="000002.png")
-
-    def test_fewer_frames_whose_names_are_times_leave_it_too(self):
+        """Also where names are times."""
         folder = self.new_folder()
         for side, name in ((0, "left"), (1, "right")):
             (folder / name).mkdir()
             for i in range(FRAMES):
                 shutil.copy(self.street / f"image_{side}/{i:06d}.png", folder / name / f"{1300 + i}.25.png")
         shutil.copy(self.street / "calib.txt", folder)
-        self.assert_fewer_frames_change_nothing(folder, first_map="1302.25.png")
+        for street, first_map in ((self.street, "000002.png"), (folder, "1302.25.png")):
+            out = self.ran(street, "--disparities", 16)
+            self.assert_refused_and_untouched(out, ["run", street, "--disparities", 16, "--out", out, "--frames", "0:1", "--resume"],
+                                              "--resume", f"disparity/{first_map}", "give the frames", "another --out")
 
     def test_a_finished_run_stays_where_it_cannot_be_made_again(self):
         for broken in (FRAMES - 1, FRAMES - 2):  # the last frame alone; one on which the next rests, too
-            street, out = self.broken_street(), self.new_folder() / "out"
-            run = ["run", "--odometry", street, "--out", out, "--quiet"]
-            self.assert_works(*run)
-            image = street / f"image_1/{broken:06d}.png"
+            street = self.broken_street()
+            out, image = self.ran(street), street / f"image_1/{broken:06d}.png"
             os.truncate(image, 1000)
-            self.assert_refused_and_untouched(out, [*run, "--resume"], "--resume", f"disparity/{broken:06d}.png", image, "another --out")
+            self.assert_refused_and_untouched(out, ["run", street, "--out", out, "--resume"], "--resume", f"disparity/{broken:06d}.png", image, "another --out")
 
     def test_a_finished_run_that_left_a_pair_out_stays_too(self):
-        street, out = self.broken_street(), self.new_folder() / "out"
+        street = self.broken_street()
         image = street / f"image_1/{FRAMES - 1:06d}.png"
         whole = image.read_bytes()
         os.truncate(image, 1000)
-        run = ["run", "--odometry", street, "--out", out, "--quiet"]
-        self.assertEqual(egosgm(*run).returncode, 0)
+        out = self.ran(street)
+        run = ["run", street, "--out", out, "--quiet"]
         image.write_bytes(whole)
         self.assert_refused_and_untouched(out, [*run, "--resume"], f"disparity/{FRAMES - 1:06d}.png", "left out", "another --out")
         os.truncate(image, 1000)
@@ -366,9 +341,8 @@ class Resume(LongRuns):
 
     def test_a_run_that_lost_its_device_goes_on_there(self):
         """By a report that says so: another device than the one that is here cannot be had."""
-        out = self.new_folder()
-        run = ["run", "--odometry", self.street, "--out", out, "--quiet"]
-        self.assert_works(*run, "--frames", ":1")
+        out = self.ran(self.street, "--frames", ":1")
+        run = ["run", self.street, "--out", out]
         report = json.loads((out / "report.json").read_text())
         lost = report["device"]
         report["device"] = {**lost, "name": "another one"}
@@ -388,14 +362,12 @@ class Resume(LongRuns):
         self.assert_works(*run, "--resume")
         self.assert_works("report", out)
         maps = os.fsdecode(name + b"/truth/left_disp_noc")
-        self.assertEqual(len(json.loads(self.assert_works("eval", maps, maps, "--json"))["pairs"]), FRAMES)
+        self.assertEqual(len(self.json_of("eval", maps, maps)["pairs"]), FRAMES)
 
     def test_other_settings_cannot_go_on(self):
-        out = self.new_folder()
-        run = ["run", "--odometry", self.street, "--out", out]
-        self.assert_works(*run, "--frames", ":1", "--quiet")
-        self.assert_refused([*run, "--resume", "--set", "p2=99"], "p2", "190", "99")
-        self.assert_refused([*run, "--resume", "--poses", self.street / "poses.txt"], "motion")
+        out = self.ran(self.street, "--frames", ":1")
+        run = ["run", self.street, "--out", out]
+        self.assert_all_refused((("--set p2=99", "p2", "190", "99"), ("--poses {street}/poses.txt", "motion")), [*run, "--resume"])
         self.assert_works(*run, "--resume")
         self.assertEqual(self.assert_whole(out), FRAMES)
         (out / "report.json").write_text("[]")

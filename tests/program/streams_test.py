@@ -43,9 +43,8 @@ class StandardError(ProgramTest):
                     self.assertEqual((out / name).read_bytes(), (expected / name).read_bytes())
 
     def test_an_interrupt_is_told_by_the_code(self):
-        street = self.street
-        rectify = ["rectify", "--left", f"{street}/image_0/*.png", "--right", f"{street}/image_1/*.png", "--calib", street / "calib.txt", "--out"]
-        for arguments in (["run", "--odometry", street, "--disparities", 16, "--out"], ["odometry", street, "--out"], *[rectify] * HAS_PACKAGE):
+        rectify = ["rectify", *self.patterns(), "--out"]
+        for arguments in (["run", self.street, "--disparities", 16, "--out"], ["odometry", self.street, "--out"], *[rectify] * HAS_PACKAGE):
             with ended_pipe() as ended:
                 process = self.started(*arguments, self.new_folder() / "out", stderr=ended)
             process.send_signal(signal.SIGINT)

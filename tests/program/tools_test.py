@@ -48,30 +48,28 @@ class Tools(ProgramTest):
         self.assertIn(b"3 pairs", self.printed("eval-video", maps, "--sequence", street))
         self.assertEqual(len(json.loads(self.printed("eval-video", maps, "--sequence", street, "--json"))["over_frames"]), FRAMES)
         self.assertIn("times.txt", json.loads(self.printed("doctor", street, "--disparities", 48, "--json"))[-1]["text"])
-        calib, rectified = street / "calib.txt", self.new_folder() / ODD
-        told = self.printed("rectify", "--left", street / "image_0/*.png", "--right", street / "image_1/*.png", "--calib", calib, "--out", rectified)
+        rectified = self.new_folder() / ODD
+        told = self.printed("rectify", *self.patterns(street), "--out", rectified)
         self.assertIn(b"4 pairs in " + os.fsencode(rectified), told)
-        for left, right in ((street / "image_0/00000%d.png", street / "image_1/00000%d.png"),):
-            self.printed("rectify", "--left", left, "--right", right, "--pair-by", "order", "--calib", calib, "--out", self.new_folder())
+        self.printed("rectify", *self.patterns(street), "--pair-by", "order", "--out", self.new_folder())
 
     def test_errors_name_what_is_no_text(self):
         gone = self.new_folder() / "b\udcffgone"
         shown = str(gone).replace("\udcff", " ")
-        for arguments, code in ((["cloud", self.out, "--out", gone / "x.ply"], 1), (["report", self.out, "--out", gone / "x.html"], 1), (["cloud", gone], 2),
-                                (["report", gone], 2), (["eval-poses", gone, self.street], 2), (["eval-video", gone, self.street], 2),
-                                (["rectify", "--list", gone, "--calib", self.street / "calib.txt", "--out", gone], 2),
-                                (["rectify", "--left", gone / "*", "--right", gone / "*", "--calib", self.street / "calib.txt", "--out", gone], 2)):
-            self.assert_refused(arguments, shown, code=code)
-        for arguments in (["report", self.out], ["eval-poses", self.out, self.street], ["eval-video", self.out, self.street / "truth/left_disp_noc"]):
-            self.assert_refused([*arguments, "--frames", "\udcff"], "FIRST:LAST")
-        self.assert_refused(["eval-video", self.out, "--sequence", self.street, "--scene", "\udcff"], "scene")
+        calib = ["--calib", self.street / "calib.txt", "--out", gone]
+        self.assert_all_refused(((["cloud", self.out, "--out", gone / "x.ply"], shown), (["report", self.out, "--out", gone / "x.html"], shown)), code=1)
+        self.assert_all_refused((
+            (["cloud", gone], shown), (["report", gone], shown), (["eval-poses", gone, self.street], shown), (["eval-video", gone, self.street], shown),
+            (["rectify", "--list", gone, *calib], shown), (["rectify", "--left", gone / "*", "--right", gone / "*", *calib], shown),
+            *(([*arguments, "--frames", "\udcff"], "FIRST:LAST") for arguments in (["report", self.out], ["eval-poses", self.out, self.street], ["eval-video", self.out, self.street])),
+            (["eval-video", self.out, "--sequence", self.street, "--scene", "\udcff"], "scene")))
 
     def test_empty_values_are_refused(self):
-        for command in (["eval-poses", self.out, self.street], ["eval-video", self.out, self.street], ["report", self.out], ["cloud", self.out], ["rectify"]):
-            for words, name in ((["--out", ""] if command[0] in ("report", "cloud", "rectify") else ["--frames", ""], None), (["--poses="], "--poses"), ([""], None)):
-                if name and command[0] not in ("eval-video", "report"):
-                    continue
-                self.assert_refused([*command, *words], name or words[0] or "an argument", "is empty")
+        out = self.out
+        self.assert_all_refused((f"{command} {words}", "an argument" if words == "''" else words.split()[0].rstrip("="), "is empty")
+                                for command, *all_words in ((f"eval-poses {out} {{street}}", "--frames ''"), (f"eval-video {out} {{street}}", "--frames ''", "--poses="),
+                                                            (f"report {out}", "--out ''", "--poses="), (f"cloud {out}", "--out ''"), ("rectify", "--out ''"))
+                                for words in (*all_words, "''"))
 
     def test_a_pipe_that_nobody_writes_to_ends_it(self):
         folder = self.new_folder()
@@ -79,7 +77,7 @@ class Tools(ProgramTest):
         (run / "report.json").unlink()
         for pipe in (run / "report.json", folder / "list", folder / "000001.png", folder / "calib"):
             os.mkfifo(pipe)
-        pairs = ["--left", self.street / "image_0/*.png", "--right", self.street / "image_1/*.png"]
+        pairs = self.patterns()[:4]
         commands = {"report": ["report", run], "cloud": ["cloud", run], "flow": ["eval-video", self.out, self.street, "--flow", folder],
                     "list": ["rectify", "--list", folder / "list", "--calib", self.street / "calib.txt", "--out", folder / "new"],
                     "calib": ["rectify", *pairs, "--calib", folder / "calib", "--out", folder / "new"]}
@@ -105,8 +103,7 @@ class Tools(ProgramTest):
 
     def test_a_standard_output_that_is_closed_becomes_no_file(self):
         out, folder = self.odd(self.out, "run"), self.new_folder()
-        calib = ["--calib", self.street / "calib.txt"]
-        rectify = ["rectify", "--left", self.street / "image_0/*.png", "--right", self.street / "image_1/*.png", *calib, "--out", folder / "new", "--quiet"]
+        rectify = ["rectify", *self.patterns(), "--out", folder / "new", "--quiet"]
         for arguments, code in ((["eval-poses", out, self.street], 1), (["cloud", out], 1), (["report", "--help"], 1), (rectify, 0)):
             done = subprocess.run(["sh", "-c", 'exec "$@" >&- <&-', "sh", PROGRAM, *map(str, arguments)], stderr=subprocess.PIPE, text=True, timeout=900)
             self.assertEqual((done.returncode, done.stderr.count("\n")), (code, code), f"{arguments}: {done.stderr}")
@@ -146,7 +143,7 @@ class ReadCalibration(ProgramTest):
         second = {**camera, "T_cn_cnm1": [[1, 0, 0, tx / fx], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}
         (street / "chain.yaml").write_text(json.dumps({"cam0": camera, "cam1": second}))
         out, temporary = self.new_folder() / "out", self.new_folder()
-        words = ["run", "--left", street / "image_0/*.png", "--right", street / "image_1/*.png", "--calib", street / "chain.yaml", "--disparities", 16, "--out"]
+        words = ["run", *self.patterns(street, street / "chain.yaml"), "--disparities", 16, "--out"]
         with self.subTest("whole"):
             environment = dict(os.environ, PYTHONPATH=str(package), TMPDIR=str(temporary))
             done = subprocess.run([sys.executable, "-B", "-m", "egosgm", *map(str, words), out], env=environment, capture_output=True, text=True, timeout=900)
