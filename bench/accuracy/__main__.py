@@ -8,7 +8,7 @@
   python3 bench/accuracy --evidence           places without evidence: what is filled there, what is wrong, what was gained over the single frame
   python3 bench/accuracy --video              over time: beside the single frame, OpenCV and its maps averaged in time; wrong motions, dropped frames
   python3 bench/accuracy --search SECONDS     better constants of the method by the figures of many inputs (docs/develop/search.md)
-  python3 bench/accuracy --paper      the table of Fucek et al. (IFAC 2017) on all scenes at hand, and its figure of a frame's stages
+  python3 bench/accuracy --paper      the table of Fucek et al. (IFAC 2017) on all scenes at hand
   python3 bench/accuracy --paper --kitti2015 DIR --scenes 84,87,130,146,148 --frames 0:10
                                       and on scenes of KITTI 2015's multi-view data
 """
@@ -23,8 +23,8 @@ import sys
 from ablation import ablation
 from ego_motion import ego_motion_table
 from evidence import evidence_tables
-from inputs import PROJECT, Bench, Failed, Missing, told
-from paper import paper_figure, paper_table
+from inputs import PROJECT, Bench, Failed, Missing
+from paper import paper_table
 from rows import main_table
 from search import Search
 from video import video_tables
@@ -60,18 +60,11 @@ def parse_arguments():
     parser.add_argument("--sequences", metavar="DIR", nargs="+", type=pathlib.Path, help="inputs of --search: recorded sequences with truth, in place of the bench's")
     parser.add_argument("--seed", type=int, default=1, help="the order in which --search tries constants (1)")
     parser.add_argument("--inputs", metavar="REGEX", default="", help="only these inputs of --ablation and --search, by title")
-    parser.add_argument("--paper", action="store_true", help="the paper's table and its figure of a frame's stages, and nothing else")
+    parser.add_argument("--paper", action="store_true", help="the paper's table and nothing else")
     parser.add_argument("--kitti2015", metavar="DIR", help="more scenes for --paper: KITTI 2015 multi-view data")
     parser.add_argument("--scenes", metavar="LIST", default="84,87,130,146,148", help="of --kitti2015")
     parser.add_argument("--frames", metavar="FIRST:LAST", default="0:10", help="of --kitti2015")
     return parser.parse_args()
-
-
-def figure_or_reason(bench):
-    try:
-        return paper_figure(bench)
-    except Exception as reason:
-        return told(reason)
 
 
 def reasons_of(rows):
@@ -86,9 +79,6 @@ def main():
     if arguments.paper:
         content["paper"], table = paper_table(bench, arguments)
         rows, skipped, code = content["paper"], [row["skipped"] for row in content["paper"] if "skipped" in row], table.exit_code()
-        figure = figure_or_reason(bench)
-        print("the stages of a frame: " + figure)
-        skipped += reasons_of([("", figure)])
     elif arguments.ablation:
         content["ablation"], skipped = ablation(bench, arguments.inputs)
         rows, code = content["ablation"], 0

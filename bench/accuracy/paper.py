@@ -1,18 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The table of Fućek et al. (IFAC 2017), and its figure of a frame's stages."""
+"""The table of Fućek et al. (IFAC 2017)."""
 import json
 import pathlib
 import re
 import statistics
 
-from inputs import PAPER, SINGLE_FRAME, STEADY_FROM, Missing, expect, program_at, scored_frames, settings, told
+from inputs import PAPER, SINGLE_FRAME, STEADY_FROM, expect, scored_frames, settings, told
 from tables import Table, shown
 
 HOST_TIMES = {"total", "odometry", "read", "write", "wall"}  # in a report; all others are stages'
 # The paper has a window of 3x3 and does not name its cost; census is the other one that was tried (docs/understand/paper.md).
 CONFIGURATIONS = {"paper": PAPER, "paper, census 5x5": (*PAPER, *settings("cost=census5x5")), "default": ()}
 COLUMNS = ("single_frame", "method", "method_interpolated", "search")
-FIGURE = "paper_stages.png"
 
 
 def scenes(bench, arguments):
@@ -94,12 +93,3 @@ def add_limits(table, title, row):
         table.add(title, "bad or missing / its single frame's", row["method"] / row["single_frame"], "", limit=limit and limit + "bad or missing")
     table.add(title, "search", row["search"], limit=limit and limit + "search")
     table.add(title, "time / its single frame's", row["time"], "", limit="paper, time" if row["is_steady"] else None)
-
-
-def paper_figure(bench):
-    """Draws a frame's stages of a synthetic street."""
-    program = program_at(bench.build / "bench/egosgm_paper_figure")
-    if not program:
-        raise Missing("no program egosgm_paper_figure: build with EGOSGM_BENCH=ON")
-    program(bench.work / FIGURE)
-    return str(bench.work / FIGURE)

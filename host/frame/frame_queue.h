@@ -51,7 +51,6 @@ class FrameQueue {
   const PipelineOptions& options() const { return options_; }
   const Device& device() const { return device_; }
   shared::ImageSize size() const { return size_; }
-  Method& method() { return method_; }
 
  private:
   using Clock = std::chrono::steady_clock;
