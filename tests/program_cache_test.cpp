@@ -17,7 +17,6 @@
 #include <vector>
 
 #include "egosgm/error.h"
-#include "host/ocl/sha256.h"
 #include "tests/support/device.h"
 #include "tests/support/fault_layer.h"
 #include "tests/support/short_video.h"
@@ -30,14 +29,9 @@ using ocl::ProgramCache;
 using testing::OutputMemory;
 using testing::ShortVideo;
 
-std::string digest(std::string_view bytes) { return ocl::hex(ocl::sha256(bytes)); }
-
-TEST(Sha256, GivesTheDigestsOfTheStandard) {
-  EXPECT_EQ(digest(""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
-  EXPECT_EQ(digest("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
-  EXPECT_EQ(digest("abcdbcdecdefdefgefghfghighijhijkijkljklmklmnlmnomnopnopq"),
-            "248d6a61d20638b8e5c026930c3e6039a33ce45964ff2167f6ecedd419db06c1");
-  EXPECT_EQ(digest(std::string(1000000, 'a')), "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
+TEST(ProgramCache, DigestsAreThoseOfFnv) {
+  EXPECT_EQ(ocl::digest_of(""), "6c62272e07bb014262b821756295c58d");
+  EXPECT_EQ(ocl::digest_of("a"), "d228cb696f1a8caf78912b704e4a8964");
 }
 
 std::string read(const fs::path& file) {
@@ -101,7 +95,7 @@ class KeptTest : public ::testing::Test {
     layer_.forbid_sources(0);
     return builds;
   }
-  fs::path aside() const { return folder_ / std::string(64, 'a'); }  // as other stores name what they keep
+  fs::path aside() const { return folder_ / std::string(32, 'a'); }  // as other stores name what they keep
   void write_aside(const std::string& text) const {
     fs::create_directories(folder_);
     write(aside(), text);
@@ -154,7 +148,7 @@ TEST_F(KeptTest, BrokenFilesAreBuiltAnew) {
   const std::string whole = read(kept[0]);
   std::string flipped = whole, of_another = whole, longer = whole + '\0';
   flipped.back() ^= 1;
-  of_another.replace(of_another.find(kept[0].stem().string()), 64, std::string(64, '0'));
+  of_another.replace(of_another.find(kept[0].stem().string()), 32, std::string(32, '0'));
   for (const std::string& broken :
        {std::string(), whole.substr(0, 20), whole.substr(0, 144), whole.substr(0, whole.size() / 2), flipped,
         of_another, longer, std::string("no program")}) {
@@ -182,8 +176,8 @@ TEST_F(KeptTest, AFileIsReplacedAndNotWrittenInto) {
 TEST_F(KeptTest, ABinaryThatTheDriverRefusesIsBuiltAnew) {
   const std::vector<OutputMemory> expected = outputs();
   const fs::path file = files()[0];
-  const std::string head = read(file).substr(0, 16 + 64), binary = "no binary of any driver";
-  write(file, head + digest(binary) + binary);
+  const std::string head = read(file).substr(0, 16 + 32), binary = "no binary of any driver";
+  write(file, head + ocl::digest_of(binary) + binary);
   expect_same_outputs(expected);
   EXPECT_TRUE(builds_without_a_compiler());
 }
