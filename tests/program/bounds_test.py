@@ -38,31 +38,28 @@ class Bounds(ProgramTest):
         file = self.new_folder() / "bomb.png"
         side = 16384
         file.write_bytes(png(side, side, 1, [bytes(side // 8)] * side, palette=bytes(6)))
-        self.assert_bounded(file, "eval", "--estimate", file, "--truth", file, says="too short")
-        plain = file.parent / "plain.png"  # as most are: another reader's
-        plain.write_bytes(png(side, side, 8, [bytes(side)] * 64))
-        self.assert_bounded(plain, "eval", "--estimate", plain, "--truth", plain, says="too short")
-        calib = self.street / "calib.txt"
-        other = file.parent / "other.png"
+        plain, other = file.with_stem("plain"), file.with_stem("other")
+        plain.write_bytes(png(side, side, 8, [bytes(side)] * 64))  # as most are: another reader's
         other.write_bytes(file.read_bytes())
-        self.assert_bounded(file, "run", file, other, "--out", self.folder / "never", says="bomb.png")
-        self.assert_bounded(file, "doctor", "--left", file, "--right", other, "--calib", calib, says="too short")
-        self.assert_bounded(file, "run", "--left", file, "--right", file, "--calib", calib, "--out", self.folder / "never", says="bomb.png")
-        self.assert_bounded(file, "rectify", "--left", file, "--right", other, "--calib", calib, "--out", self.new_folder() / "out", says="too short")
+        calib, out = ["--calib", self.street / "calib.txt"], ["--out", self.folder / "never"]
+        for of, says, *command in ((file, "too short", "eval", file, file), (plain, "too short", "eval", plain, plain), (file, "bomb.png", "run", file, other, *out),
+                                   (file, "too short", "doctor", "--left", file, "--right", other, *calib), (file, "bomb.png", "run", "--left", file, "--right", file, *calib, *out),
+                                   (file, "too short", "rectify", "--left", file, "--right", other, *calib, *out)):
+            with self.subTest(command=command[0], file=of.name):
+                self.assert_bounded(of, *command, says=says)
 
     def test_headers_of_large_images(self):
         """No pipeline is built of a size that only a header, or only one image of a pair, has."""
         folder, side = self.new_folder(), 4096
-        for name in ("header.png", "other.png"):
-            (folder / name).write_bytes(png(side, side, 8, []))
-        (folder / "whole.png").write_bytes(png(side, side, 8, [bytes(side)] * side))
-        for left in ("header.png", "whole.png"):
+        header, other, whole = (folder / f"{name}.png" for name in ("header", "other", "whole"))
+        for file in (header, other, whole):
+            file.write_bytes(png(side, side, 8, [bytes(side)] * side * (file == whole)))
+        for left, named in ((header, header), (whole, other)):
+            pair = ["--left", left, "--right", other, "--calib", self.street / "calib.txt"]
             for command in (["run", "--disparities", 16], ["odometry"]):
                 with self.subTest(left=left, command=command[0]):
-                    self.assert_bounded(folder / "header.png" if left == "header.png" else folder / "other.png", *command, "--left", folder / left, "--right",
-                                        folder / "other.png", "--calib", self.street / "calib.txt", "--out", folder / "never", says="1 of 1 pair could not be read")
-        self.assert_bounded(folder / "header.png", "doctor", "--left", folder / "header.png", "--right", folder / "other.png", "--calib", self.street / "calib.txt",
-                            says="not a readable image")
+                    self.assert_bounded(named, *command, *pair, "--out", folder / "never", says="1 of 1 pair could not be read")
+        self.assert_bounded(header, "doctor", "--left", header, "--right", other, "--calib", self.street / "calib.txt", says="not a readable image")
 
     def test_the_largest_map_that_a_small_file_may_hold(self):
         file = self.new_folder() / "flat.png"

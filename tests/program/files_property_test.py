@@ -118,22 +118,10 @@ class Commands:
 
     def spelled(self, path, cwd):
         """One of the many names of a path."""
-        path, kind = str(path), self.rng.randrange(8)
-        if kind == 0:
-            return os.path.relpath(path, cwd)
-        if kind == 1:
-            return path + "/"
-        if kind == 2:
-            return path + "/."
-        if kind == 3:
-            return f"{os.path.dirname(path)}/./{os.path.basename(path)}"
-        if kind == 4:
-            return f"{path}/../{os.path.basename(path)}"
-        if kind == 5 and f"{self.tree.root}/user" in path:
-            return path.replace(f"{self.tree.root}/user", f"{self.tree.root}/links/user")
-        if kind == 6:
-            return "./" + os.path.relpath(path, cwd)
-        return path
+        path = str(path)
+        folder, name = os.path.split(path)
+        return self.rng.choice([path, os.path.relpath(path, cwd), "./" + os.path.relpath(path, cwd), path + "/", path + "/.", f"{folder}/./{name}", f"{path}/../{name}",
+                                path.replace(f"{self.tree.root}/user", f"{self.tree.root}/links/user")])
 
     def folder(self, cwd):
         root = self.tree.root

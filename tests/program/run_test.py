@@ -387,30 +387,26 @@ class Limits(ProgramTest):
         self.assert_same_files(self.run_with("--frames", ":1", **one), self.run_with("--frames", ":1"), "disparity/*")
 
     def test_a_range_that_does_not_fit_is_matched_in_stripes(self):
-        folder, out = self.new_folder(), self.new_folder()
+        folder = self.new_folder()
         for side in ("left", "right"):
             (folder / f"{side}.png").write_bytes(grey_png(640, 400))
         (folder / "calib.toml").write_text("fx = 400\nfy = 400\ncx = 320\ncy = 200\nbaseline_m = 0.5\n")
-        run = ["run", "--left", folder / "left.png", "--right", folder / "right.png", "--calib", folder / "calib.toml", "--out", out]
+        pair = ["--left", folder / "left.png", "--right", folder / "right.png", "--calib", folder / "calib.toml"]
         gigabyte = dict(os.environ, POCL_MEMORY_LIMIT="1")
-        run[run.index("--out") + 1] = whole = self.new_folder()
-        told = self.assert_works(*run, "--disparities", 4096)
-        self.assertIn(f"{self.report(whole)['device_memory_bytes'] >> 20} MiB of the device are in use; --set max_memory_mib=N", told)
-        run[run.index("--out") + 1] = out
-        self.assertNotIn("MiB of the device", self.assert_works(*run, "--disparities", 2048, env=gigabyte))
-        report = self.report(out)
+        told = self.assert_works("run", *pair, "--disparities", 4096, "--out", folder / "whole")
+        self.assertIn(f"{self.report(folder / 'whole')['device_memory_bytes'] >> 20} MiB of the device are in use; --set max_memory_mib=N", told)
+        self.assertNotIn("MiB of the device", self.assert_works("run", *pair, "--disparities", 2048, "--out", folder / "stripes", env=gigabyte))
+        report = self.report(folder / "stripes")
         self.assertGreater(report["frames"][0]["stripes"], 1)
         self.assertLess(report["device_memory_bytes"], 1 << 30)
-        run[run.index("--out") + 1] = out = self.new_folder()  # that just fits, and leaves less than what is left to all else
-        self.assert_works(*run, "--disparities", 352, "--set", "constants.banded_sgm.scheduling=paths", env=gigabyte)
-        self.assertEqual(self.report(out)["frames"][0]["stripes"], 1)
-        self.assertGreater(self.report(out)["device_memory_bytes"], 3 << 28)
-        run[run.index("--out") + 1] = self.new_folder()
-        run += ["--disparities", 64, "--set"]
-        self.assert_refused([*run, "max_memory_mib=3"], "BandedSgm: a stripe of 96 rows needs", " MiB, max_memory_mib allows 3 MiB", "fewer disparities",
-                            code=1)
-        least = int(re.search(r"needs (\d+) MiB", egosgm(*run, "max_memory_mib=3").stderr)[1])
-        self.assert_works(*run, f"max_memory_mib={least}")
+        # One that just fits, and leaves less than what is left to all else.
+        report = self.report(self.ran(*pair, "--disparities", 352, "--set", "constants.banded_sgm.scheduling=paths", env=gigabyte))
+        self.assertEqual(report["frames"][0]["stripes"], 1)
+        self.assertGreater(report["device_memory_bytes"], 3 << 28)
+        run = ["run", *pair, "--disparities", 64, "--out", self.folder / "never", "--set", "max_memory_mib=3"]
+        self.assert_refused(run, "BandedSgm: a stripe of 96 rows needs", " MiB, max_memory_mib allows 3 MiB", "fewer disparities", code=1)
+        least = int(re.search(r"needs (\d+) MiB", egosgm(*run).stderr)[1])
+        self.ran(*pair, "--disparities", 64, "--set", f"max_memory_mib={least}")
         for name in ("a.png", "b.png"):
             (folder / name).write_bytes(grey_png(4096, 3000))
         self.assert_refused(["run", folder / "a.png", folder / "b.png", "--out", self.new_folder() / "out"],

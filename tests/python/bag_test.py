@@ -71,9 +71,7 @@ def test_stamps_pair_within_their_bound_and_gaps_are_told(tmp_path, street, fram
 
 def test_messages_that_were_received_out_of_order(tmp_path, street, frames):
     """Within a second they are sorted: no pair is made up, and none is lost."""
-    recording = Recording("mcap")
-    for side, name in enumerate(SIDES):
-        recording.info(f"/{name}/camera_info", street.calibration, side)
+    recording = drive_of(street, [])
     for i, name in ((2, "left"), (0, "left"), (0, "right"), (2, "right"), (1, "right"), (1, "left"), (3, "left"), (3, "right")):
         recording.image(f"/{name}/image_rect", START + i * RATE_NS, getattr(frames[i % FRAMES], name))
     path = recording.write(tmp_path / "drive")
@@ -134,9 +132,8 @@ def test_a_pair_that_comes_twice_is_left_out(tmp_path, street, frames):
 
 
 def test_without_stamps_the_times_of_the_recording_are_taken(tmp_path, street, frames):
-    recording = Recording("mcap")
+    recording = drive_of(street, [])
     for side, name in enumerate(SIDES):
-        recording.info(f"/{name}/camera_info", street.calibration, side)
         for i in range(FRAMES):
             recording.image(f"/{name}/image_rect", 0, (frames[i].left, frames[i].right)[side], received=START + i * RATE_NS + 1_000_000 * side)
     path = recording.write(tmp_path / "drive")
@@ -151,10 +148,8 @@ def test_without_stamps_the_times_of_the_recording_are_taken(tmp_path, street, f
 def test_the_parts_of_a_bag_in_a_folder_that_nothing_describes(kind, suffix, tmp_path, street, frames):
     (tmp_path / "parts").mkdir()
     for part in (1, 0):
-        recording = Recording(kind)
+        recording = Recording(kind) if part else drive_of(street, [], kind=kind)
         for side, name in enumerate(SIDES):
-            if part == 0:
-                recording.info(f"/{name}/camera_info", street.calibration, side)
             time = START + part * RATE_NS
             recording.image(f"/{name}/image_rect", time, (frames[part].left, frames[part].right)[side], received=time + side)
         written = recording.write(tmp_path / f"part_{part}{suffix if kind == 'ros1' else ''}")
@@ -276,12 +271,10 @@ def test_an_empty_distortion_and_an_unset_rotation(tmp_path, street, frames):
 
 
 def test_the_first_infos_may_be_unset(tmp_path, street, frames):
+    def unset(info):
+        info.k, info.p, info.r = np.zeros(9), np.zeros(12), np.zeros(9)
     recording = drive_of(street, frames)
-    for side, name in enumerate(SIDES):
-        recording.info(f"/{name}/camera_info", street.calibration, side)
-        received, topic, kind, message = recording.messages.pop()
-        message.k, message.p, message.r = np.zeros(9), np.zeros(12), np.zeros(9)
-        recording.messages.append((START - 1, topic, kind, message))
+    recording.messages += [(START - 1, *message) for _, *message in drive_of(street, [], unset).messages]
     bag = bags.Bag(recording.write(tmp_path / "drive"), "/left/image_rect", "/right/image_rect")
     assert len(list(bag.frames())) == FRAMES and bag.cameras.calibration.fx == pytest.approx(street.calibration.fx)
 

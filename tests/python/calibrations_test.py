@@ -97,6 +97,11 @@ RAW = {
 }
 
 
+def read(folder, name, text, **how):
+    (folder / name).write_text(text)
+    return egosgm.read_calibration(folder / name, **how)
+
+
 def expect_rectified(found):
     assert [found.fx, found.fy, found.cx, found.cy, found.baseline_m, found.doffs_px] == pytest.approx([F, F, CX, CY, B, 0], abs=1e-9)
 
@@ -110,50 +115,33 @@ def expect_raw(found):
     np.testing.assert_array_equal(same.rectify(image, image)[0], expected.rectify(image, image)[0])
 
 
-@pytest.mark.parametrize("name", RECTIFIED)
-def test_of_rectified_images(name, tmp_path):
-    (tmp_path / name).write_text(RECTIFIED[name])
-    expect_rectified(egosgm.read_calibration(tmp_path / name))
+@pytest.mark.parametrize("name", [*RECTIFIED, *RAW])
+def test_of_each_program(name, tmp_path):
+    text, expect = (RECTIFIED[name], expect_rectified) if name in RECTIFIED else (RAW[name], expect_raw)
+    expect(read(tmp_path, name, text))
 
 
-@pytest.mark.parametrize("name", RAW)
-def test_of_raw_images(name, tmp_path):
-    (tmp_path / name).write_text(RAW[name])
-    expect_raw(egosgm.read_calibration(tmp_path / name))
+@pytest.mark.parametrize("name, text", [
+    ("kalibr.yaml", kalibr()), ("left.yaml", ros(P)), ("orb_slam.yaml", RECTIFIED["orb_slam3.yaml"] + f"Camera.width: {WIDTH}\nCamera.height: {HEIGHT}\n"),
+    ("flat.json", RECTIFIED["flat.json"]), ("q.json", json.dumps(dict(Q=Q, image_size=[WIDTH, HEIGHT]))),
+    ("nested.json", json.dumps(dict(Q=Q, image_size=dict(width=WIDTH, height=HEIGHT)))), ("text.json", json.dumps(dict(Q=Q, resolution=f"{WIDTH}x{HEIGHT}"))),
+    ("inner.json", json.dumps(dict(intrinsics=dict(fx=F, cx=CX, cy=CY, width=WIDTH, height=HEIGHT), baseline=B))),
+    ("kitti.txt", RECTIFIED["kitti.txt"].replace("P", "P_rect_0") + f"S_rect_00: {WIDTH} {HEIGHT}\n"),
+    ("middlebury.txt", f"cam0=[{F} 0 {CX}; 0 {F} {CY}; 0 0 1]\ncam1=[{F} 0 {CX}; 0 {F} {CY}; 0 0 1]\nbaseline={1000 * B}\nwidth={WIDTH}\nheight={HEIGHT}\n"),
+], ids=lambda value: value if "." in value[:16] else "")
+def test_of_rectified_images_of_another_size(name, text, tmp_path):
+    (tmp_path / "right.yaml").write_text(ros(RIGHT_P))  # beside ROS's left.yaml
+    expect_rectified(read(tmp_path, name, text, size=np.array([WIDTH, HEIGHT])))
+    expect_refused(f"{name}.*is of images of 640x480, and these have 320x240", lambda: read(tmp_path, name, text, size=(WIDTH // 2, HEIGHT // 2)))
 
 
-def test_of_rectified_images_of_another_size(tmp_path):
-    def read(name, size):
-        return egosgm.read_calibration(tmp_path / name, size=size)
-
-    (tmp_path / "kalibr.yaml").write_text(kalibr())
-    (tmp_path / "left.yaml").write_text(ros(P))
-    (tmp_path / "right.yaml").write_text(ros(RIGHT_P))
-    (tmp_path / "orb_slam.yaml").write_text(RECTIFIED["orb_slam3.yaml"] + f"Camera.width: {WIDTH}\nCamera.height: {HEIGHT}\n")
-    (tmp_path / "flat.json").write_text(RECTIFIED["flat.json"])
-    (tmp_path / "q.json").write_text(json.dumps(dict(Q=Q, image_size=[WIDTH, HEIGHT])))
-    (tmp_path / "nested.json").write_text(json.dumps(dict(Q=Q, image_size=dict(width=WIDTH, height=HEIGHT))))
-    (tmp_path / "text.json").write_text(json.dumps(dict(Q=Q, resolution=f"{WIDTH}x{HEIGHT}")))
-    (tmp_path / "inner.json").write_text(json.dumps(dict(intrinsics=dict(fx=F, cx=CX, cy=CY, width=WIDTH, height=HEIGHT), baseline=B)))
-    (tmp_path / "kitti.txt").write_text(RECTIFIED["kitti.txt"].replace("P", "P_rect_0") + f"S_rect_00: {WIDTH} {HEIGHT}\n")
-    (tmp_path / "middlebury.txt").write_text(f"cam0=[{F} 0 {CX}; 0 {F} {CY}; 0 0 1]\ncam1=[{F} 0 {CX}; 0 {F} {CY}; 0 0 1]\nbaseline={1000 * B}\nwidth={WIDTH}\nheight={HEIGHT}\n")
-    for name in ("kalibr.yaml", "left.yaml", "orb_slam.yaml", "flat.json", "q.json", "nested.json", "text.json", "inner.json", "kitti.txt", "middlebury.txt"):
-        expect_rectified(read(name, np.array([WIDTH, HEIGHT])))
-        expect_refused(f"{name}.*is of images of 640x480, and these have 320x240", lambda: read(name, (WIDTH // 2, HEIGHT // 2)))
-    expect_refused("size 640: give .width, height.", lambda: read("kalibr.yaml", WIDTH))
-    (tmp_path / "kalibr_lens.yaml").write_text(RAW["kalibr_lens.yaml"])
-    expect_raw(read("kalibr_lens.yaml", (WIDTH, HEIGHT)))
-
-
-def test_a_q_of_swapped_cameras_is_refused(tmp_path):
-    for last, named in ((-1 / B, "a baseline of -0.3 m: are left and right swapped"), (0, "no baseline")):
-        (tmp_path / "q.json").write_text(json.dumps(dict(Q=[*Q[:3], [0, 0, last, 0]])))
-        expect_refused(named, lambda: egosgm.read_calibration(tmp_path / "q.json"))
+def test_a_size_is_a_width_and_a_height(tmp_path):
+    expect_raw(read(tmp_path, "kalibr_lens.yaml", RAW["kalibr_lens.yaml"], size=(WIDTH, HEIGHT)))
+    expect_refused("size 640: give .width, height.", lambda: read(tmp_path, "kalibr_lens.yaml", RAW["kalibr_lens.yaml"], size=WIDTH))
 
 
 def test_two_files_of_ros_and_of_kimera(tmp_path):
-    (tmp_path / "left.yaml").write_text(ros(P))
-    expect_refused("is the calibration of one camera", lambda: egosgm.read_calibration(tmp_path / "left.yaml"))
+    expect_refused("is the calibration of one camera", lambda: read(tmp_path, "left.yaml", ros(P)))
     (tmp_path / "right.yaml").write_text(ros(RIGHT_P))
     for given in ("left.yaml", "right.yaml", "."):
         expect_rectified(egosgm.read_calibration(tmp_path / given))
@@ -223,21 +211,20 @@ def test_cameras_of_rovers(tmp_path):
     turn = np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]])  # the rover's x is ahead, its z down
     place = np.array([0.3, -0.2, -1.5])
 
-    def read(left, right):
-        (tmp_path / "left.cahv").write_text(left)
+    def read_both(left, right):
         (tmp_path / "right.cahv").write_text(right)
-        return egosgm.read_calibration(tmp_path / "left.cahv")
+        return read(tmp_path, "left.cahv", left)
 
-    expect_rectified(read(cahv(place, turn), cahv(place + B * turn[0], turn)))
+    expect_rectified(read_both(cahv(place, turn), cahv(place + B * turn[0], turn)))
     expect_rectified(egosgm.read_calibration((tmp_path / "left.cahv", tmp_path / "right.cahv")))
     toed_in = np.array([[0.0, np.cos(0.01), np.sin(0.01)], [0, -np.sin(0.01), np.cos(0.01)], [1, 0, 0]])
-    rig = read(cahv(place, turn), cahv(place + B * turn[0], toed_in))
+    rig = read_both(cahv(place, turn), cahv(place + B * turn[0], toed_in))
     np.testing.assert_allclose(rig.R, toed_in @ turn.T, atol=1e-12)
     np.testing.assert_allclose(rig.T, toed_in @ (-B * turn[0]), atol=1e-12)
     lens = dict(O=turn[2], R=[0, -0.1, 0.05])
-    assert read(cahv(place, turn, **lens), cahv(place + B * turn[0], turn, **lens)).left_distortion.tolist() == [-0.1, 0.05, 0, 0, 0]
+    assert read_both(cahv(place, turn, **lens), cahv(place + B * turn[0], turn, **lens)).left_distortion.tolist() == [-0.1, 0.05, 0, 0, 0]
     for others, named in ((dict(O=[1, 0, 0.01], R=[0, -0.1, 0]), "CAHVOR, whose lens has an axis O"), (dict(E=[0, 0, 0]), "CAHVORE"), (dict(R=[0, 1, 0]), "CAHVOR")):
-        expect_refused(f"right.cahv: is a rover's camera .CAHV.*{named}", lambda: read(cahv(place, turn), cahv(place + B * turn[0], turn, **others)))
+        expect_refused(f"right.cahv: is a rover's camera .CAHV.*{named}", lambda: read_both(cahv(place, turn), cahv(place + B * turn[0], turn, **others)))
 
 
 @pytest.mark.parametrize("name, text", [
@@ -265,8 +252,7 @@ TRANSPOSED = np.transpose(K).tolist()
     (f"P0: {' '.join(map(str, flat(np.transpose(P))))}\nP1: {' '.join(map(str, flat(np.transpose(RIGHT_P))))}\n", "P0"),
 ])
 def test_transposed_matrices_are_named(text, named, tmp_path):
-    (tmp_path / "calib.txt").write_text(text)
-    expect_refused(f"{named}:? is transposed, as MATLAB writes it", lambda: egosgm.read_calibration(tmp_path / "calib.txt"))
+    expect_refused(f"{named}:? is transposed, as MATLAB writes it", lambda: read(tmp_path, "calib.txt", text))
 
 
 def test_vins_and_its_cameras(tmp_path):
@@ -335,16 +321,13 @@ def test_what_is_packed(tmp_path):
 
 
 def test_a_fisheye(tmp_path):
-    (tmp_path / "chain.yaml").write_text(kalibr([0.01, 0, 0, 0], "equidistant"))
-    assert egosgm.read_calibration(tmp_path / "chain.yaml").is_fisheye
-    (tmp_path / "ideal.yaml").write_text(kalibr([0, 0, 0, 0], "equidistant"))
-    assert egosgm.read_calibration(tmp_path / "ideal.yaml").is_fisheye
+    for first in (0.01, 0):
+        assert read(tmp_path, "chain.yaml", kalibr([first, 0, 0, 0], "equidistant")).is_fisheye
     lenses = dict(M1=np.array(K), D1=np.array(LENS), M2=np.array(K), D2=np.array(LENS), R=np.array(EYE), T=np.array([-B, 0, 0]))
     np.savez(tmp_path / "rig.npz", **lenses)
     assert egosgm.read_calibration(tmp_path / "rig.npz", is_fisheye=True).is_fisheye
     for name, text in {"radtan.yaml": kalibr(LENS), "own.txt": RECTIFIED["own.txt"], "q.yml": RECTIFIED["q.yml"]}.items():
-        (tmp_path / name).write_text(text)
-        expect_refused(f"{name}: is of rectified images, or says itself what its lenses are", lambda: egosgm.read_calibration(tmp_path / name, is_fisheye=True))
+        expect_refused(f"{name}: is of rectified images, or says itself what its lenses are", lambda: read(tmp_path, name, text, is_fisheye=True))
     oak = json.loads(RAW["oak.json"])
     for kind in (1, 2):  # as DepthAI numbers its models of lenses
         for _, camera in oak["cameraData"][:2]:
@@ -377,12 +360,10 @@ def test_a_fisheye(tmp_path):
     (kalibr(T_cn_cnm1=SHIFT, resolution=[1280, 960]), "of two resolutions, 640x480 and 1280x960"),
     ("hfov: 69.7\nwidth: 640\nheight: 480\n", "lacks the baseline"),
     (RECTIFIED["orb_slam2.yaml"].replace(f"fx: {F}", "fx: -1"), "calib.yaml: calibration: fx is -1"),
+    (json.dumps(dict(Q=[*Q[:3], [0, 0, -1 / B, 0]])), "a baseline of -0.3 m: are left and right swapped"), (json.dumps(dict(Q=[*Q[:3], [0, 0, 0, 0]])), "no baseline"),
 ])
 def test_what_is_known_and_not_enough_is_named(text, named, tmp_path):
-    (tmp_path / "calib.yaml").write_text(text)
-    with pytest.raises(egosgm.InvalidArgument) as refused:
-        egosgm.read_calibration(tmp_path / "calib.yaml")
-    assert named in str(refused.value)
+    expect_refused(re.escape(named), lambda: read(tmp_path, "calib.yaml", text))
 
 
 ODD = ("", "nan", "1e400", "[]", "{}", "x", "null", "true", "0", "[[1], [2, 3]]", "{a: 1}", '"a"', "9" * 30)
@@ -404,16 +385,14 @@ def test_what_was_edited_is_read_or_refused(tmp_path):
     rng = random.Random(1)
     for name, text in {**RECTIFIED, **RAW, "zed.conf": zed}.items():
         for _ in range(40):
-            (tmp_path / name).write_text(broken(text, rng))
             with contextlib.suppress(egosgm.InvalidArgument):
-                egosgm.read_calibration(tmp_path / name, size=(672, 376))
+                read(tmp_path, name, broken(text, rng), size=(672, 376))
 
 
 def test_units_are_never_guessed(tmp_path):
-    (tmp_path / "chain.yaml").write_text(kalibr(LENS, T_cn_cnm1=[[1, 0, 0, -30.0], *SHIFT[1:]]))
-    expect_refused("centimetres .0.3 m. or millimetres .0.03 m..*--unit cm.*--unit mm", lambda: egosgm.read_calibration(tmp_path / "chain.yaml"))
-    expect_raw(egosgm.read_calibration(tmp_path / "chain.yaml", unit_m=0.01))
+    chain = kalibr(LENS, T_cn_cnm1=[[1, 0, 0, -30.0], *SHIFT[1:]])
+    expect_refused("centimetres .0.3 m. or millimetres .0.03 m..*--unit cm.*--unit mm", lambda: read(tmp_path, "chain.yaml", chain))
+    expect_raw(read(tmp_path, "chain.yaml", chain, unit_m=0.01))
     for name in ("own.txt", "q.yml"):
-        (tmp_path / name).write_text(RECTIFIED[name])
-        expect_refused(f"{name}: is of rectified images.*leave --unit", lambda: egosgm.read_calibration(tmp_path / name, unit_m=0.001))
-        expect_rectified(egosgm.read_calibration(tmp_path / name, unit_m=1))
+        expect_refused(f"{name}: is of rectified images.*leave --unit", lambda: read(tmp_path, name, RECTIFIED[name], unit_m=0.001))
+        expect_rectified(read(tmp_path, name, RECTIFIED[name], unit_m=1))

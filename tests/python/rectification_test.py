@@ -121,7 +121,7 @@ def test_what_no_rig_has_is_named():
                            ({"left_matrix": np.eye(2)}, "M1: needs 3x3"), ({"left_distortion": np.zeros(3)}, "D1: needs 4"), ({"size": (1, 1)}, "1x1 were calibrated"),
                            ({"R": [[1, 0, 0], [0, np.nan, 0], [0, 0, 1]]}, "R: needs 3x3"),
                            ({"right_matrix": np.zeros((3, 3))}, "M2 is no camera matrix"),
-                           ({"left_matrix": projection()[:, :3].T}, "M1 is no camera matrix"),
+                           ({"left_matrix": projection()[:, :3].T}, "M1 is no camera matrix"), ({"left_matrix": projection(fx=-150)[:, :3]}, "M1 is no camera matrix"),
                            ({"right_matrix": np.diag([1.25, 1.25, 1]) @ turned().left_matrix}, "M1 and M2 are of images of two sizes: .* 1.25 times"),
                            ({"right_matrix": np.diag([0.5, 0.5, 1]) @ turned().left_matrix}, "two sizes: .* 2 times"), ({"R": np.diag([1, 1, -1])}, "R is no rotation"), ({"R": 2 * np.eye(3)}, "R is no rotation"),
                            ({"given": (2 * np.eye(3), np.eye(3), np.eye(3, 4), np.eye(3, 4))}, "R1 is no rotation"),
