@@ -20,10 +20,9 @@ struct Choice {
 };
 constexpr Choice<MatchingCost> choice(MatchingCost, int i) {
   constexpr Choice<MatchingCost> choices[] = {{"census9x7", MatchingCost::kCensus9x7},
-                                              {"learned7x7", MatchingCost::kLearned7x7},
                                               {"census5x5", MatchingCost::kCensus5x5},
                                               {"sad3x3", MatchingCost::kSad3x3}};
-  return i < 4 ? choices[i] : Choice<MatchingCost>{nullptr, {}};
+  return i < 3 ? choices[i] : Choice<MatchingCost>{nullptr, {}};
 }
 constexpr Choice<Preset> choice(Preset, int i) {
   constexpr Choice<Preset> choices[] = {{"default", Preset::kDefault}, {"paper", Preset::kPaper}};

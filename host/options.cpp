@@ -42,9 +42,8 @@ void for_each(Options& o, Visit&& visit) {
                    "Set it to false if your rectification is exact, as for rendered images."},
         o.vertical_alignment);
   visit(OptionText{"cost", "Matching cost of a pixel pair: Hamming distance of codes, or sum of absolute differences.",
-                   "", "census9x7, learned7x7, census5x5, sad3x3",
-                   "Set learned7x7 for single pairs full of texture, not for noisy or plain scenes; census5x5 if thin "
-                   "objects are lost; sad3x3 needs cameras of equal brightness."},
+                   "", "census9x7, census5x5, sad3x3",
+                   "Set census5x5 if thin objects are lost; sad3x3 needs cameras of equal brightness."},
         o.cost);
   visit(OptionText{"paths", "Paths of the semi-global aggregation.", "", "4, 8",
                    "Set 8 if single pairs count more than time."},

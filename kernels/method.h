@@ -187,24 +187,4 @@
 // they tell nothing of the others.
 #define EGOSGM_OFFSET_PRIOR 0.01f
 
-// The comparisons of MatchingCost::kLearned7x7 beside a census of 5x5: dx, dy, dx, dy, threshold. A bit is set where
-// the sum of the 3x3 grey values around the first place is less than that around the second plus the threshold, in
-// ninths of a grey level of 8 bits. bench/learn_census.py learned the table. It did so on videos that are all under
-// CC0: path-traced ones, planes with noise, and the project's own streets, each as it is and with other contrast,
-// exposure, sharpness and noise.
-// clang-format off
-#define EGOSGM_LEARNED7X7_BITS 40
-#define EGOSGM_LEARNED7X7 \
-  { \
-    {3, -3, 2, -3, -5}, {3, 3, 2, 3, 0}, {3, -3, 1, -3, 9}, {3, 3, 2, 2, 9}, {-1, -3, -3, -3, -5}, \
-    {2, -2, 3, -3, -9}, {1, -3, -1, -3, -5}, {-2, 3, -3, 3, -9}, {3, 0, 2, -3, 9}, {-1, 2, -1, 3, 0}, \
-    {-1, -3, -1, -2, 0}, {2, 3, 3, 2, -9}, {2, -3, 0, -3, -5}, {-2, -3, -3, -3, 5}, {1, 3, -1, 3, 5}, \
-    {1, -3, 2, -1, -18}, {1, 2, 1, 3, -9}, {-3, -3, -3, -2, 5}, {2, -3, 3, 3, 36}, {-2, 2, -3, 3, -9}, \
-    {3, -2, 3, -3, -5}, {0, 3, 3, 3, -9}, {-2, 2, -1, 3, 18}, {0, -2, 0, -3, -18}, {0, -3, -1, -3, 5}, \
-    {3, 3, 3, 1, 9}, {-3, 3, -2, 3, -9}, {3, -2, 2, -2, -5}, {0, 2, 0, 3, 5}, {-2, -3, -3, 0, 18}, \
-    {2, 3, 3, -3, 18}, {-3, 3, -3, 1, -5}, {3, 3, 2, 2, -18}, {1, -3, 2, -3, -9}, {-2, -3, -1, -3, 9}, \
-    {3, 0, 3, -2, -5}, {-1, -3, -1, 3, -18}, {1, -1, 1, -3, -9}, {3, 1, 2, 1, -5}, {0, 3, -2, 3, -5} \
-  }
-// clang-format on
-
 #endif

@@ -121,7 +121,7 @@ TEST(Options, KeepEveryBitOfANumber) {
 
 TEST(Options, TakeEveryNameOfAChoice) {
   PipelineOptions options;
-  for (const std::string cost : {"census9x7", "learned7x7", "census5x5", "sad3x3"}) {
+  for (const std::string cost : {"census9x7", "census5x5", "sad3x3"}) {
     set_option(options, "cost", cost);
     EXPECT_EQ(texts(options)["cost"], cost);
   }
@@ -167,7 +167,7 @@ TEST(Options, RefusesTextsThatAreNoValue) {
   expect_refused([&] { set_option(options, "disparities", "99999999999"); }, {"a whole number"});
   expect_refused([&] { set_option(options, "search_sigmas", "many"); }, {"a number"});
   expect_refused([&] { set_option(options, "temporal", "maybe"); }, {"on or off"});
-  expect_refused([&] { set_option(options, "cost", "census"); }, {"one of census9x7, learned7x7, census5x5, sad3x3"});
+  expect_refused([&] { set_option(options, "cost", "census"); }, {"one of census9x7, census5x5, sad3x3"});
   expect_refused([&] { set_option(options, "preset", "Paper"); }, {"one of default, paper"});
 }
 

@@ -113,7 +113,7 @@ TEST(Pipeline, GivesTheSameBitsForTheSameImagesWith16Bits) {
   Setting setting = standard();
   setting.options.vertical_alignment.enabled = false;  // resamples 16 bits more finely
   setting.options.sad_check.max_difference = 9;
-  for (const MatchingCost cost : {MatchingCost::kLearned7x7, MatchingCost::kSad3x3}) {
+  for (const MatchingCost cost : {MatchingCost::kCensus9x7, MatchingCost::kSad3x3}) {
     setting.options.banded_sgm.cost = cost;
     const Video video(setting);
     Pipeline pipeline_8 = make_pipeline(setting), pipeline_16 = make_pipeline(setting);

@@ -12,7 +12,6 @@ ABLATION = [
     ("full range", {"constants.search": "full"}, "Fusion without the band: what the narrow search costs or gains."),
     ("half-width 4", {"min_half_width_px": 4}, "A wider least band."),
     ("eight paths", {"paths": 8}, "Twice the aggregation."),
-    ("learned 7x7", {"cost": "learned7x7"}, "A census of 5x5 and learned comparisons of 3x3 means."),
     ("census 5x5", {"cost": "census5x5"}, "A smaller window."),
     ("no band from neighbours", {"constants.search_band.from_neighbours": False}, "A pixel without a prediction then searches everything."),
     ("no gate", {"gate_px": 0}, "Prediction and measurement are averaged even where they contradict each other."),

@@ -18,8 +18,6 @@ Comparisons comparisons(MatchingCost cost) {
       return {1, 2, 2};
     case MatchingCost::kCensus9x7:
       return {1, 4, 3};
-    case MatchingCost::kLearned7x7:
-      return {2, 4, 4};  // the window, and a pixel around it for sums of 3x3
   }
   return {};
 }

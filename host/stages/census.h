@@ -25,9 +25,7 @@ class Census {
   void encode_alike(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes) { encode(images, codes, true); }
 
   /// 32-bit words of a code, and of all codes.
-  static int words(MatchingCost cost) {
-    return cost == MatchingCost::kCensus9x7 || cost == MatchingCost::kLearned7x7 ? 2 : 1;
-  }
+  static int words(MatchingCost cost) { return cost == MatchingCost::kCensus9x7 ? 2 : 1; }
   static std::size_t words(MatchingCost cost, shared::ImageSize size, int padding, int code_words = 0) {
     return 2 * (static_cast<std::size_t>(size.width) + 2 * static_cast<std::size_t>(padding)) * size.height *
            std::max(code_words, words(cost));

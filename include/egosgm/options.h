@@ -11,8 +11,7 @@
 namespace egosgm {
 
 /// Matching cost of a pixel pair: Hamming distance of codes, or the mean absolute difference of a 3x3 window.
-/// kLearned7x7: a census of 5x5 and 40 learned comparisons of 3x3 means within 7x7 pixels.
-enum class MatchingCost { kCensus9x7, kLearned7x7, kCensus5x5, kSad3x3 };
+enum class MatchingCost { kCensus9x7, kCensus5x5, kSad3x3 };
 
 /// The options' starting point, and the constants of the method.
 /// kPaper: the method of Fućek et al. (IFAC 2017), docs/understand/paper.md.

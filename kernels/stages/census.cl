@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Computes a code a pixel for matching: a bit for each comparison of two grey values in a window around it.
 // - Census transform (Zabih and Woodfill 1994): every pixel of the window, row by row, against the centre.
-// - Learned: a census of 5x5, and sums of 3x3 grey values at two places of a 7x7 window against each other, with a
-//   threshold (EGOSGM_LEARNED7X7).
 // - Alike, in place of the census of 9x7 where it is asked for, of grey values of 16 bits: which pixels of the window
 // are
 //   about as bright as its centre, so that they may lie on its surface.
@@ -19,21 +17,19 @@
 
 // lint: PIXEL_BYTES=1 CODE_BYTES=8 COMPARISONS=1 RADIUS_X=4 RADIUS_Y=3 PIXELS=16
 // lint: PIXEL_BYTES=1 CODE_BYTES=4 COMPARISONS=1 RADIUS_X=2 RADIUS_Y=2 PIXELS=1
-// lint: PIXEL_BYTES=1 CODE_BYTES=8 COMPARISONS=2 RADIUS_X=4 RADIUS_Y=4 PIXELS=16
 // lint: PIXEL_BYTES=2 CODE_BYTES=8 COMPARISONS=1 RADIUS_X=4 RADIUS_Y=3 PIXELS=16
 // lint: PIXEL_BYTES=1 CODE_BYTES=4 COMPARISONS=0 RADIUS_X=1 RADIUS_Y=1 PIXELS=1
 // lint: PIXEL_BYTES=2 CODE_BYTES=8 COMPARISONS=1 RADIUS_X=4 RADIUS_Y=3 PIXELS=1
 // lint: PIXEL_BYTES=2 CODE_BYTES=4 COMPARISONS=1 RADIUS_X=2 RADIUS_Y=2 PIXELS=16
 // lint: PIXEL_BYTES=2 CODE_BYTES=8 COMPARISONS=1 RADIUS_X=2 RADIUS_Y=2 PIXELS=16
 // lint: PIXEL_BYTES=2 CODE_BYTES=8 COMPARISONS=1 RADIUS_X=2 RADIUS_Y=2 PIXELS=1
-// lint: PIXEL_BYTES=2 CODE_BYTES=8 COMPARISONS=2 RADIUS_X=4 RADIUS_Y=4 PIXELS=1
 // lint: PIXEL_BYTES=2 CODE_BYTES=4 COMPARISONS=0 RADIUS_X=1 RADIUS_Y=1 PIXELS=16
 
 #ifndef PIXELS
 #error "PIXELS: of a work-item, 1 or 16"
 #endif
 #ifndef COMPARISONS
-#error "COMPARISONS: 0 for the grey value, 1 for a census window, 2 for the learned ones"
+#error "COMPARISONS: 0 for the grey value, 1 for a census window"
 #endif
 #ifndef RADIUS_X
 #error "RADIUS_X: half the window's width"
@@ -43,33 +39,14 @@
 #endif
 
 // The comparisons, and the place of each beside the centre.
-#if COMPARISONS == 2
-#define CENSUS_X 2
-#define CENSUS_Y 2
-#define LEARNED EGOSGM_LEARNED7X7_BITS
-#else
-#define CENSUS_X RADIUS_X
-#define CENSUS_Y RADIUS_Y
-#define LEARNED 0
-#endif
-#define WINDOW_WIDTH (2 * CENSUS_X + 1)
-#define COUNT (WINDOW_WIDTH * (2 * CENSUS_Y + 1) - 1)
+#define WINDOW_WIDTH (2 * RADIUS_X + 1)
+#define COUNT (WINDOW_WIDTH * (2 * RADIUS_Y + 1) - 1)
 #define PLACE(i) ((i) < COUNT / 2 ? (i) : (i) + 1)
-#define DX(i) (PLACE(i) % WINDOW_WIDTH - CENSUS_X)
-#define DY(i) (PLACE(i) / WINDOW_WIDTH - CENSUS_Y)
-
-#if COMPARISONS == 2
-constant char kLearned[LEARNED][5] = EGOSGM_LEARNED7X7;
-// The place of sums whose rows and columns begin at the window's.
-#define SUMS 7
-#define FIRST_PLACE(i, stride) ((kLearned[i][1] + SUMS / 2) * (stride) + kLearned[i][0] + SUMS / 2)
-#define SECOND_PLACE(i, stride) ((kLearned[i][3] + SUMS / 2) * (stride) + kLearned[i][2] + SUMS / 2)
-// Grey values of 16 bits are 257 times those of 8.
-#define THRESHOLD(i) (kLearned[i][4] * (PIXEL_BYTES == 1 ? 1 : 257))
-#endif
+#define DX(i) (PLACE(i) % WINDOW_WIDTH - RADIUS_X)
+#define DY(i) (PLACE(i) / WINDOW_WIDTH - RADIUS_Y)
 
 // A code of one word: its distances are twice as large then, as those of one that is alone count twice (cost.h).
-#define STANDS_TWICE (CODE_BYTES == 8 && COUNT + LEARNED <= 32)
+#define STANDS_TWICE (CODE_BYTES == 8 && COUNT <= 32)
 
 // The rows of the window around a pixel; outside the image its border's.
 typedef struct {
@@ -90,32 +67,6 @@ static inline Rows rows_around(const ImageSize size, global const Pixel* image, 
 // It asks for pixels of Rows, and compares the window.
 #include "alike.h"
 
-#if COMPARISONS == 2
-// The learned bits of a pixel.
-static inline Code learned_code_at(const int width, const Rows* rows, const int x) {
-  int sums[SUMS * SUMS];
-#pragma unroll
-  for (int row = 0; row < SUMS; ++row) {
-    int columns[SUMS + 2];
-#pragma unroll
-    for (int column = 0; column < SUMS + 2; ++column) {
-      const int at = clamp(x + column - RADIUS_X, 0, width - 1);
-      columns[column] = rows->at[row][at] + rows->at[row + 1][at] + rows->at[row + 2][at];
-    }
-#pragma unroll
-    for (int column = 0; column < SUMS; ++column) {
-      sums[row * SUMS + column] = columns[column] + columns[column + 1] + columns[column + 2];
-    }
-  }
-  Code code = 0;
-#pragma unroll
-  for (int i = 0; i < LEARNED; ++i) {
-    code = code << 1 | (sums[FIRST_PLACE(i, SUMS)] < sums[SECOND_PLACE(i, SUMS)] + THRESHOLD(i) ? 1 : 0);
-  }
-  return code;
-}
-#endif
-
 // alike: whether the code says what is alike, where that can be asked.
 static inline Code code_at(const int width, const Rows* rows, const int x, const int alike) {
 #if HAS_ALIKE
@@ -127,9 +78,6 @@ static inline Code code_at(const int width, const Rows* rows, const int x, const
   Code code = 0;
 #pragma unroll
   for (int i = 0; i < COUNT; ++i) code = code << 1 | (AT(DX(i), DY(i)) < AT(0, 0) ? 1 : 0);
-#if COMPARISONS == 2
-  code = code << LEARNED | learned_code_at(width, rows, x);
-#endif
   return STANDS_TWICE ? code << (4 * CODE_BYTES) | code : code;
 #endif
 }
@@ -162,82 +110,17 @@ static inline void write_codes_at(const Rows* rows, const int x, const int width
 
 #else
 
-#if COMPARISONS == 2
-
-#if PIXEL_BYTES == 1
-typedef short Sum;
-typedef short16 SumVector;
-#define convert_sums convert_short16
-#else
-typedef int Sum;
-typedef int16 SumVector;
-#define convert_sums convert_int16
-#endif
-typedef struct __attribute__((packed)) {
-  SumVector sums;
-} PackedSums;
-#define SUMS_WIDTH (CODES_AT_ONCE + SUMS - 1)
-#define SUMS_VECTORS ((SUMS_WIDTH + 15) / 16)  // the last one overlaps the one before it
-
-// The sums that the codes of pixels from x on compare: SUMS rows.
-static inline void sum_around(const Rows* rows, const int x, Sum* sums) {
-#pragma unroll
-  for (int vector = 0; vector < SUMS_VECTORS; ++vector) {
-    const int at = min(vector * 16, SUMS_WIDTH - 16);
-    SumVector across[SUMS + 2];
-#pragma unroll
-    for (int row = 0; row < SUMS + 2; ++row) {
-      global const Pixel* from = rows->at[row] + x - RADIUS_X + at;
-      across[row] =
-          convert_sums(load_grey(from)) + convert_sums(load_grey(from + 1)) + convert_sums(load_grey(from + 2));
-    }
-#pragma unroll
-    for (int row = 0; row < SUMS; ++row) {
-      ((PackedSums*)(sums + row * SUMS_WIDTH + at))->sums = across[row] + across[row + 1] + across[row + 2];
-    }
-  }
-}
-
-// Eight learned bits of 16 pixels, from the lowest but 8 `byte` on.
-static inline uchar16 learned_byte(const Sum* sums, const int byte) {
-  SumVector bits = 0;
-#pragma unroll
-  for (int bit = 0; bit < 8; ++bit) {
-    const int i = LEARNED - 1 - 8 * byte - bit;
-    const SumVector first = ((const PackedSums*)(sums + FIRST_PLACE(i, SUMS_WIDTH)))->sums;
-    const SumVector second = ((const PackedSums*)(sums + SECOND_PLACE(i, SUMS_WIDTH)))->sums;
-    bits |= (first < second + (SumVector)((Sum)THRESHOLD(i))) & (SumVector)((Sum)(1 << bit));
-  }
-  return convert_uchar16(bits);
-}
-
-#endif
-
 // No column needs clamping here. Bits are put into bytes: compilers keep these in narrow vectors.
 static inline void write_codes_at(const Rows* rows, const int x, const int width, const int view, global Code* row) {
-#if COMPARISONS == 2
-  Sum sums[SUMS * SUMS_WIDTH];
-  sum_around(rows, x, sums);
-#endif
   const Greys centre = load_greys(rows->at[RADIUS_Y] + x);
   Bytes bytes[CODE_BYTES];
 #pragma unroll
   for (int byte = 0; byte < CODE_BYTES; ++byte) bytes[byte] = 0;
 #pragma unroll
   for (int i = 0; i < COUNT; ++i) {
-    const int place = COUNT + LEARNED - 1 - i;
+    const int place = COUNT - 1 - i;
     bytes[place / 8] |= bit_where_less(BESIDE(DX(i), DY(i)), centre, 1 << place % 8);
   }
-#if COMPARISONS == 2
-#pragma unroll
-  for (int byte = 0; byte < LEARNED / 8; ++byte) {
-#if CODES_AT_ONCE == 32
-    bytes[byte] = (Bytes)(learned_byte(sums, byte), learned_byte(sums + 16, byte));
-#else
-    bytes[byte] = learned_byte(sums, byte);
-#endif
-  }
-#endif
 #if STANDS_TWICE
 #pragma unroll
   for (int byte = 0; byte < 4; ++byte) bytes[byte + 4] = bytes[byte];

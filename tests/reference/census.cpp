@@ -31,28 +31,15 @@ std::vector<std::uint64_t> codes(shared::ImageSize size, const std::vector<std::
     return image[static_cast<std::size_t>(std::clamp(y, 0, size.height - 1)) * size.width +
                  std::clamp(x, 0, size.width - 1)];
   };
-  const auto sum_around = [&](int x, int y) {
-    int sum = 0;
-    for (int dy = -1; dy <= 1; ++dy) {
-      for (int dx = -1; dx <= 1; ++dx) sum += at(x + dx, y + dy);
-    }
-    return sum;
-  };
   const std::vector<Offset> offsets = cost == MatchingCost::kCensus9x7 ? window(4, 3)
                                       : cost == MatchingCost::kSad3x3  ? std::vector<Offset>{}
                                                                        : window(2, 2);
-  const int steps_per_grey = bits == 8 ? 1 : 257;
   std::vector<std::uint64_t> codes;
   codes.reserve(image.size());
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
       std::uint64_t code = cost == MatchingCost::kSad3x3 ? at(x, y) >> (bits - 8) : 0;
       for (const Offset& offset : offsets) code = 2 * code + (at(x + offset.dx, y + offset.dy) < at(x, y));
-      if (cost == MatchingCost::kLearned7x7) {
-        for (const auto& [dx1, dy1, dx2, dy2, threshold] : kLearnedComparisons) {
-          code = 2 * code + (sum_around(x + dx1, y + dy1) - sum_around(x + dx2, y + dy2) < steps_per_grey * threshold);
-        }
-      }
       codes.push_back(code);
     }
   }
@@ -82,9 +69,7 @@ std::vector<std::uint64_t> alike_codes(shared::ImageSize size, const std::vector
   return codes;
 }
 
-int word_count(MatchingCost cost) {
-  return cost == MatchingCost::kCensus9x7 || cost == MatchingCost::kLearned7x7 ? 2 : 1;
-}
+int word_count(MatchingCost cost) { return cost == MatchingCost::kCensus9x7 ? 2 : 1; }
 
 std::vector<std::uint32_t> padded_codes(shared::ImageSize size, const std::vector<std::uint64_t>& left,
                                         const std::vector<std::uint64_t>& right, int padding, MatchingCost cost) {

@@ -107,7 +107,7 @@ class ReasonsTest : public ::testing::TestWithParam<shared::ImageSize> {};
 TEST_P(ReasonsTest, EqualsReference) {
   const shared::ImageSize size = GetParam();
   for (const int white : {255, 65535}) {
-    for (const MatchingCost cost : {MatchingCost::kCensus5x5, MatchingCost::kLearned7x7, MatchingCost::kSad3x3}) {
+    for (const MatchingCost cost : {MatchingCost::kCensus5x5, MatchingCost::kCensus9x7, MatchingCost::kSad3x3}) {
       for (const bool has_prediction : {false, true}) {
         MethodOptions options;
         options.disparities = 21;

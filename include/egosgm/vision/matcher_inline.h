@@ -140,8 +140,6 @@ inline int Matcher::getBlockSize() const {
   switch (options().cost) {
     case MatchingCost::kCensus9x7:
       return 9;
-    case MatchingCost::kLearned7x7:
-      return 7;
     case MatchingCost::kCensus5x5:
       return 5;
     case MatchingCost::kSad3x3:
