@@ -307,9 +307,9 @@ const std::vector<Case> kFullRange{{.size = {1, 1}, .range = {0, 16}, .banded = 
                                    {.size = {320, 97}, .range = {0, 16}, .banded = false},
                                    {.size = {127, 33}, .range = {0, 64}, .paths = 4, .banded = false}};
 
-template <typename Change>
-std::vector<Case> changed(std::vector<Case> cases, Change change) {
-  std::for_each(cases.begin(), cases.end(), change);
+template <typename... Changes>
+std::vector<Case> changed(std::vector<Case> cases, Changes... changes) {
+  for (Case& c : cases) (changes(c), ...);
   return cases;
 }
 
@@ -378,21 +378,16 @@ INSTANTIATE_TEST_SUITE_P(BandedPaths, BandedSgmTest, ValuesIn(changed(kBanded, a
 INSTANTIATE_TEST_SUITE_P(FullRangePaths, BandedSgmTest, ValuesIn(changed(kFullRange, along_paths)), name);
 INSTANTIATE_TEST_SUITE_P(ReadOff, BandedSgmTest, ValuesIn(changed(kBanded, read_off)), name);
 INSTANTIATE_TEST_SUITE_P(ReadOffFullRange, BandedSgmTest, ValuesIn(changed(kFullRange, read_off)), name);
-INSTANTIATE_TEST_SUITE_P(ReadOffSweeps, BandedSgmTest, ValuesIn(changed(changed(kBanded, read_off), whole_sweeps)),
-                         name);
-INSTANTIATE_TEST_SUITE_P(ReadOffViewByView, BandedSgmTest, ValuesIn(changed(changed(kBanded, read_off), view_by_view)),
-                         name);
+INSTANTIATE_TEST_SUITE_P(ReadOffSweeps, BandedSgmTest, ValuesIn(changed(kBanded, read_off, whole_sweeps)), name);
+INSTANTIATE_TEST_SUITE_P(ReadOffViewByView, BandedSgmTest, ValuesIn(changed(kBanded, read_off, view_by_view)), name);
 INSTANTIATE_TEST_SUITE_P(ReadOffSmallTiles, BandedSgmTest, ValuesIn(changed(in_small_tiles(), read_off)), name);
-INSTANTIATE_TEST_SUITE_P(ReadOffPaths, BandedSgmTest, ValuesIn(changed(changed(kBanded, read_off), along_paths)), name);
+INSTANTIATE_TEST_SUITE_P(ReadOffPaths, BandedSgmTest, ValuesIn(changed(kBanded, read_off, along_paths)), name);
 INSTANTIATE_TEST_SUITE_P(ReadOffGroupedPaths, BandedSgmTest, ValuesIn(changed(in_groups(), read_off)), name);
 INSTANTIATE_TEST_SUITE_P(FewRows, BandedSgmTest, ValuesIn(changed(kBanded, in_few_rows)), name);
-INSTANTIATE_TEST_SUITE_P(FewRowsSweeps, BandedSgmTest, ValuesIn(changed(changed(kBanded, in_few_rows), whole_sweeps)),
-                         name);
-INSTANTIATE_TEST_SUITE_P(FewRowsViewByView, BandedSgmTest,
-                         ValuesIn(changed(changed(kBanded, in_few_rows), view_by_view)), name);
+INSTANTIATE_TEST_SUITE_P(FewRowsSweeps, BandedSgmTest, ValuesIn(changed(kBanded, in_few_rows, whole_sweeps)), name);
+INSTANTIATE_TEST_SUITE_P(FewRowsViewByView, BandedSgmTest, ValuesIn(changed(kBanded, in_few_rows, view_by_view)), name);
 INSTANTIATE_TEST_SUITE_P(FewRowsSmallTiles, BandedSgmTest, ValuesIn(changed(in_small_tiles(), in_few_rows)), name);
-INSTANTIATE_TEST_SUITE_P(FewRowsPaths, BandedSgmTest, ValuesIn(changed(changed(kBanded, in_few_rows), along_paths)),
-                         name);
+INSTANTIATE_TEST_SUITE_P(FewRowsPaths, BandedSgmTest, ValuesIn(changed(kBanded, in_few_rows, along_paths)), name);
 INSTANTIATE_TEST_SUITE_P(FewRowsGroupedPaths, BandedSgmTest, ValuesIn(changed(in_groups(), in_few_rows)), name);
 INSTANTIATE_TEST_SUITE_P(GroupedPaths, BandedSgmTest, ValuesIn(in_groups()), name);
 

@@ -76,17 +76,5 @@ TEST(CoarseMatch, FindsAQuarterOfTheDisparity) {
   EXPECT_GE(near, 28);
 }
 
-TEST(CoarseMatch, CoversTheRange) {
-  for (const auto& [range, first, last] : {std::tuple{shared::DisparityRange{0, 1}, 0, 0},
-                                           {shared::DisparityRange{0, 128}, 0, 31},
-                                           {shared::DisparityRange{-5, 3}, -2, -1},
-                                           {shared::DisparityRange{-8, 5}, -2, -1},
-                                           {shared::DisparityRange{3, 2}, 0, 1}}) {
-    const shared::DisparityRange coarse = CoarseMatch::coarse_range(range);
-    EXPECT_EQ(coarse.min, first);
-    EXPECT_EQ(coarse.min + coarse.count - 1, last);
-  }
-}
-
 }  // namespace
 }  // namespace egosgm

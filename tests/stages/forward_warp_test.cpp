@@ -9,7 +9,6 @@
 
 #include "tests/reference/disparity_space.h"
 #include "tests/reference/forward_warp.h"
-#include "tests/reference/present_rows.h"
 #include "tests/support/stage_case.h"
 
 namespace egosgm {
@@ -84,6 +83,8 @@ TEST_P(ForwardWarpTest, EqualsReference) {
   Calibration calibration{
       .fx = 0.6 * size.width, .fy = 0.7 * size.width, .cx = 0.48 * size.width, .cy = 0.55 * size.height};
   calibration.baseline_m = 0.5;
+  testing::HostMaps before = testing::earlier_maps(size);
+  before.hidden.assign(before.disparity.size(), 0), before.evidence.assign(before.disparity.size(), 77);
   for (const shared::DisparityRange range : {shared::DisparityRange{0, 128}, {-20, 37}, {3, 1}}) {
     calibration.doffs_px = range.min < 0 ? 25.5 : 0;
     // The noise of few steps makes many equal disparities, so that ties are met.
@@ -94,72 +95,17 @@ TEST_P(ForwardWarpTest, EqualsReference) {
     for (int repetition = 0; repetition < 3; ++repetition) {
       Motion motion = random_motion(random, 0.5, 0.05);
       if (repetition > 0) motion.covariance = random_covariance(random, 0.01);
+      const shared::DisparityMotion left = disparity_motion(calibration, motion, EGOSGM_LEFT);
       shared::DisparityMotion right = disparity_motion(calibration, motion, EGOSGM_RIGHT);
-      for (const auto& [step, pixels] : {std::pair{1, 1}, {1, 16}, {2, 1}, {2, 16}}) {
-        right.row_step = step;
-        const testing::HostMaps expected = reference::forward_warp(
-            size, range, disparity_motion(calibration, motion, EGOSGM_LEFT), right, 0.25f, belief);
-        const testing::HostMaps actual = warp(size, calibration, range, 0.25f, belief, motion, pixels, {2, step});
-        EXPECT_TRUE(testing::same_maps(reference::without_absent_rows(size, step, actual), expected, size))
-            << "min " << range.min << ", by " << pixels << ", row step " << step;
-      }
+      SCOPED_TRACE(range.min);
+      testing::expect_reference(
+          size, before,
+          [&](int pixels, Views views) { return warp(size, calibration, range, 0.25f, belief, motion, pixels, views); },
+          [&](int step) {
+            right.row_step = step;
+            return reference::forward_warp(size, range, left, right, 0.25f, belief);
+          });
     }
-  }
-}
-
-TEST_P(ForwardWarpTest, PredictsTheLeftViewAlone) {
-  const shared::ImageSize size = GetParam();
-  const testing::HostMaps belief = testing::random_maps(size, 0, 70, 0.2, 18);
-  std::mt19937 random(19);
-  const Motion motion = random_motion(random, 0.3, 0.02);
-  const testing::HostMaps both = warp(size, kCalibration, kRange, 0.25f, belief, motion);
-  for (const int pixels : {1, 16}) {
-    const testing::HostMaps one = warp(size, kCalibration, kRange, 0.25f, belief, motion, pixels, Views::kLeft);
-    EXPECT_TRUE(testing::same_maps(one, testing::left_and_right(both, testing::earlier_maps(size)), size));
-    const std::size_t left = one.hidden.size() / 2;
-    EXPECT_TRUE(
-        std::equal(one.hidden.begin(), one.hidden.begin() + static_cast<std::ptrdiff_t>(left), both.hidden.begin()));
-    EXPECT_EQ(std::count(one.hidden.begin() + static_cast<std::ptrdiff_t>(left), one.hidden.end(), 1), 0);
-  }
-}
-
-TEST(ForwardWarp, WithoutMotionOnlyTheVarianceGrows) {
-  const testing::HostMaps belief = testing::random_maps(kSize, 0, 63, 0.2, 13);
-  const testing::HostMaps predicted = warp(belief, {});
-  EXPECT_TRUE(testing::same_bits(predicted.disparity, belief.disparity, kSize));
-  for (std::size_t i = 0; i < belief.variance.size(); ++i) {
-    ASSERT_EQ(predicted.variance[i], belief.disparity[i] > kNone ? belief.variance[i] + 0.25f : 0.0f);
-  }
-}
-
-// 5 m away, 1 m forward: the depth is 4 / 5 of what it was, all that is relative to the principal point 5 / 4.
-TEST(ForwardWarp, ForwardMotionExpandsAboutThePrincipalPoint) {
-  testing::HostMaps belief = testing::empty_maps(kSize);
-  for (const int view : {EGOSGM_LEFT, EGOSGM_RIGHT}) {
-    belief.disparity[at(kSize, view, 70, 38)] = 10;
-    belief.variance[at(kSize, view, 70, 38)] = 2;
-    belief.disparity[at(kSize, view, 50, 30)] = 10;
-  }
-  const testing::HostMaps predicted = warp(belief, translation(0, 0, -1));
-  for (const int view : {EGOSGM_LEFT, EGOSGM_RIGHT}) {
-    EXPECT_EQ(count_valid(predicted.disparity, view), 2u);
-    EXPECT_FLOAT_EQ(predicted.disparity[at(kSize, view, 75, 40)], 12.5f);
-    EXPECT_FLOAT_EQ(predicted.variance[at(kSize, view, 75, 40)], 1.5625f * 2 + 0.25f);
-    EXPECT_FLOAT_EQ(predicted.disparity[at(kSize, view, 50, 30)], 12.5f);
-  }
-}
-
-TEST(ForwardWarp, RotationMovesPointsAtInfinity) {
-  testing::HostMaps belief = testing::empty_maps(kSize);
-  for (const int view : {EGOSGM_LEFT, EGOSGM_RIGHT}) belief.disparity[at(kSize, view, 50, 30)] = 0;
-  // Yaw that carries the optical axis 10 px to the right; pitch that carries it 10 px up.
-  const testing::HostMaps yawed = warp(belief, rotation({0, 1, 0}, std::atan(0.1)));
-  const testing::HostMaps pitched = warp(belief, rotation({1, 0, 0}, std::atan(0.1)));
-  for (const int view : {EGOSGM_LEFT, EGOSGM_RIGHT}) {
-    EXPECT_EQ(yawed.disparity[at(kSize, view, 60, 30)], 0);
-    EXPECT_EQ(count_valid(yawed.disparity, view), 1u);
-    EXPECT_EQ(pitched.disparity[at(kSize, view, 50, 20)], 0);
-    EXPECT_EQ(count_valid(pitched.disparity, view), 1u);
   }
 }
 

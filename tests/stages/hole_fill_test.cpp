@@ -6,7 +6,6 @@
 #include <algorithm>
 
 #include "tests/reference/hole_fill.h"
-#include "tests/reference/present_rows.h"
 #include "tests/support/stage_case.h"
 
 namespace egosgm {
@@ -50,33 +49,17 @@ EGOSGM_TEST_AT_ALL_SIZES(HoleFillTest);
 
 TEST_P(HoleFillTest, EqualsReference) {
   const shared::ImageSize size = GetParam();
-  for (const float max_difference_px : {0.0f, 1.0f, 100.0f}) {
-    testing::HostMaps maps = testing::random_maps(size, -20, 100, 0.4, 4);
-    for (std::size_t i = 0; i < maps.variance.size(); ++i) {
-      if (maps.disparity[i] != kNone) maps.variance[i] = static_cast<float>(7 + i % 5);
-      maps.hidden.push_back(maps.disparity[i] == kNone && i % 3 > 0);
-    }
-    for (const auto& [step, pixels] : {std::pair{1, 1}, {1, 16}, {2, 1}, {2, 16}}) {
-      const testing::HostMaps expected = reference::hole_fill(size, max_difference_px, maps, step);
-      const testing::HostMaps actual = fill(size, max_difference_px, maps, pixels, {2, step});
-      EXPECT_TRUE(testing::same_maps(reference::without_absent_rows(size, step, actual), expected, size))
-          << max_difference_px << " px, by " << pixels << ", row step " << step;
-    }
+  testing::HostMaps before = testing::earlier_maps(size), maps = testing::random_maps(size, -20, 100, 0.4, 4);
+  before.hidden.assign(before.disparity.size(), 9);
+  for (std::size_t i = 0; i < maps.variance.size(); ++i) {
+    if (maps.disparity[i] != kNone) maps.variance[i] = static_cast<float>(7 + i % 5);
+    maps.hidden.push_back(maps.disparity[i] == kNone && i % 3 > 0);
   }
-}
-
-TEST_P(HoleFillTest, FillsTheLeftViewAlone) {
-  const shared::ImageSize size = GetParam();
-  testing::HostMaps maps = testing::random_maps(size, -20, 100, 0.4, 4);
-  maps.hidden.assign(maps.disparity.size(), 0);
-  const std::ptrdiff_t right = static_cast<std::ptrdiff_t>(maps.disparity.size() / 2);
-  for (std::ptrdiff_t i = 0; i < right; ++i) maps.hidden[i] = maps.disparity[i] == kNone && i % 3 > 0;
-  const testing::HostMaps both = reference::hole_fill(size, 1, maps);
-  for (const int pixels : {1, 16}) {
-    SCOPED_TRACE(pixels);
-    const testing::HostMaps actual = fill(size, 1, maps, pixels, Views::kLeft);
-    EXPECT_TRUE(testing::same_maps(actual, testing::left_and_right(both, testing::earlier_maps(size)), size));
-    EXPECT_TRUE(std::equal(actual.hidden.begin(), actual.hidden.begin() + right, both.hidden.begin()));
+  for (const float max_px : {0.0f, 1.0f, 100.0f}) {
+    SCOPED_TRACE(max_px);
+    testing::expect_reference(
+        size, before, [&](int pixels, Views views) { return fill(size, max_px, maps, pixels, views); },
+        [&](int step) { return reference::hole_fill(size, max_px, maps, step); });
   }
 }
 
@@ -128,13 +111,6 @@ TEST(HoleFill, FillsRowsThenColumnsOnTheirResult) {
             (std::vector<float>{8, 8, 8,          //
                                 9, 8.25f, 8.25f,  //
                                 8.5f, 8.5f, 8.5f}));
-}
-
-TEST(HoleFill, DoesNotReachIntoTheOtherView) {
-  const shared::ImageSize size{1, 2};
-  testing::HostMaps maps = left_view(size, {}, {});
-  maps.disparity = {10, kNone, 10, 10};
-  EXPECT_EQ(fill(size, 1, maps).disparity, maps.disparity);
 }
 
 }  // namespace

@@ -6,7 +6,6 @@
 #include <random>
 
 #include "tests/reference/kalman_update.h"
-#include "tests/reference/present_rows.h"
 #include "tests/support/stage_case.h"
 
 namespace egosgm {
@@ -109,31 +108,22 @@ reference::FrameEvidence random_evidence(shared::ImageSize size, unsigned seed, 
 TEST_P(KalmanUpdateTest, EqualsReferenceWithEvidence) {
   const shared::ImageSize size = GetParam();
   const testing::HostMaps predicted = testing::random_maps(size, -4, 4, 0.3, 16);
-  testing::HostMaps measured = testing::random_maps(size, -5, 5, 0.2, 17);
+  const testing::HostMaps measured = testing::random_maps(size, -5, 5, 0.2, 17);
+  testing::HostMaps before = testing::earlier_maps(size);
+  before.doubtful.assign(before.disparity.size(), 9), before.evidence.assign(before.disparity.size(), 7);
   for (const auto& [repeats, sees_again] : {std::pair{false, false}, {true, false}, {false, true}}) {
+    SCOPED_TRACE(std::to_string(repeats) + std::to_string(sees_again));
     reference::FrameEvidence evidence = random_evidence(size, 18, repeats, sees_again);
-    for (const auto& [step, pixels] : {std::pair{1, 1}, {1, 16}, {2, 1}, {2, 16}}) {
-      const auto present = [&](const testing::HostMaps& maps) {
-        return reference::without_absent_rows(size, step, maps);
-      };
-      evidence.right_row_step = step;
-      const testing::HostMaps expected =
-          present(reference::kalman_update(size, {}, present(predicted), present(measured), &evidence));
-      const testing::HostMaps actual = present(update(size, {}, predicted, measured, pixels, {2, step}, &evidence));
-      EXPECT_TRUE(testing::same_maps(actual, expected, size))
-          << repeats << sees_again << ", by " << pixels << ", row step " << step;
-    }
-  }
-}
-
-TEST_P(KalmanUpdateTest, UpdatesTheLeftViewAlone) {
-  const shared::ImageSize size = GetParam();
-  const testing::HostMaps predicted = testing::random_maps(size, -2, 2, 0.3, 9);
-  const testing::HostMaps measured = testing::random_maps(size, -3, 3, 0.2, 10);
-  const testing::HostMaps both = update(size, {}, predicted, measured);
-  for (const int pixels : {1, 16}) {
-    const testing::HostMaps one = update(size, {}, predicted, measured, pixels, Views::kLeft);
-    EXPECT_TRUE(testing::same_maps(one, testing::left_and_right(both, testing::earlier_maps(size)), size));
+    testing::expect_reference(
+        size, before,
+        [&](int pixels, Views views) { return update(size, {}, predicted, measured, pixels, views, &evidence); },
+        [&](int step) {
+          evidence.right_row_step = step;
+          const auto present = [&](const testing::HostMaps& maps) {
+            return reference::without_absent_rows(size, step, maps);
+          };
+          return present(reference::kalman_update(size, {}, present(predicted), present(measured), &evidence));
+        });
   }
 }
 

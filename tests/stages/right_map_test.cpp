@@ -76,12 +76,6 @@ TEST(RightMap, LandsOnTheNearestPixelWithTheVarianceOfItsSource) {
   EXPECT_EQ(right.variance, (Row{3, 0, 4, 5, 0, 0}));
 }
 
-TEST(RightMap, HasNothingWhereNothingLandsAndNothingWasMeasured) {
-  const testing::HostMaps right = right_row(Row(20, kNone), Row(20, kNone));
-  EXPECT_EQ(right.disparity, Row(20, kNone));
-  EXPECT_EQ(right.variance, Row(20, 0));
-}
-
 TEST(RightMap, TakesWhatTheMeasuredPixelHasOrTheMeasurement) {
   // Right 2 sees left 3 by a measurement of 1, left 5 by 3.
   const Row left{kNone, kNone, kNone, 1.25f, kNone, 3};
@@ -97,11 +91,6 @@ TEST(RightMap, TakesWhatTheMeasuredPixelHasOrTheMeasurement) {
   EXPECT_EQ(at_2(3.4f), std::pair(3.0f, 6.0f));
   EXPECT_EQ(at_2(0.6f), std::pair(1.25f, 4.0f));
   EXPECT_EQ(at_2(60), std::pair(60.0f, 102.0f)) << "of a place outside";
-}
-
-TEST(RightMap, TakesAMeasurementThatContradictsWhatItSees) {
-  const Row left{kNone, kNone, kNone, 5};
-  EXPECT_EQ(right_row(left, {kNone, kNone, 1, kNone}).disparity[2], 1);
 }
 
 TEST(RightMap, TakesTheNearestWhicheverComesLast) {
@@ -150,14 +139,6 @@ TEST(RightMap, DropsWhatIsNoDisparity) {
   const float nan = std::numeric_limits<float>::quiet_NaN(), infinite = std::numeric_limits<float>::infinity();
   EXPECT_EQ(right_row({nan, infinite, -infinite, 1e30f, -3e9f, 3e9f}, Row(6, nan)).disparity, Row(6, kNone));
   EXPECT_EQ(right_row({kNone, 1, 2}, {nan, kNone, nan}).disparity, (Row{2, kNone, kNone})) << "NaN measures nothing";
-}
-
-TEST(RightMap, HasTheDisparitiesOfTheLeftViewToTheBit) {
-  const Row left{kNone, kNone, kNone, kNone, 1.3f, kNone, kNone, 2.7654321f, kNone, -0.4999f};
-  const Row right = right_row(left, Row(left.size(), kNone)).disparity;
-  EXPECT_EQ(right[3], 1.3f);
-  EXPECT_EQ(right[4], 2.7654321f);
-  EXPECT_EQ(right[9], -0.4999f) << "half a pixel below the range";
 }
 
 }  // namespace

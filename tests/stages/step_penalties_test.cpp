@@ -41,25 +41,21 @@ TEST_P(StepPenaltiesTest, EqualsReference) {
     const int bits = type == PixelType::kU8 ? 8 : 16;
     const std::vector<std::uint16_t> grey = random_grey(size, bits);
     const shared::ImageSize of_steps{4 * size.width, size.height};
-    for (const auto& [step, pixels] : {std::pair{1, 1}, {1, 16}, {2, 1}, {2, 16}}) {
-      const auto present = [&, row_step = step](const std::vector<std::uint8_t>& steps) {
-        return reference::without_absent_rows(of_steps, row_step, steps, std::uint8_t{0});
-      };
-      EXPECT_TRUE(testing::same_bits(present(penalties(size, grey, type, kOptions, pixels, {2, step})),
-                                     present(reference::step_penalties(size, grey, bits, kOptions)), of_steps))
-          << "by " << pixels << ", row step " << step;
+    const std::vector<std::uint8_t> expected = reference::step_penalties(size, grey, bits, kOptions);
+    const std::vector<std::uint8_t> before(StepPenalties::bytes(size), kUntouched);
+    for (const int pixels : {1, 16}) {
+      for (const int step : {1, 2}) {
+        const auto present = [&](const std::vector<std::uint8_t>& steps) {
+          return reference::without_absent_rows(of_steps, step, steps, std::uint8_t{0});
+        };
+        EXPECT_TRUE(testing::same_bits(present(penalties(size, grey, type, kOptions, pixels, {2, step})),
+                                       present(expected), of_steps))
+            << "by " << pixels << ", row step " << step;
+      }
+      EXPECT_TRUE(testing::same_bits(penalties(size, grey, type, kOptions, pixels, Views::kLeft),
+                                     testing::left_and_right(expected, before), of_steps))
+          << "the left view alone, by " << pixels;
     }
-  }
-}
-
-TEST_P(StepPenaltiesTest, AreWrittenOfTheLeftViewAlone) {
-  const shared::ImageSize size = GetParam();
-  const std::vector<std::uint16_t> grey = random_grey(size, 8);
-  const std::vector<std::uint8_t> before(StepPenalties::bytes(size), kUntouched);
-  const auto expected = testing::left_and_right(penalties(size, grey, PixelType::kU8, kOptions), before);
-  for (const int pixels : {1, 16}) {
-    EXPECT_TRUE(testing::same_bits(penalties(size, grey, PixelType::kU8, kOptions, pixels, Views::kLeft), expected,
-                                   {4 * size.width, size.height}));
   }
 }
 

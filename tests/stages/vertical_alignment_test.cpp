@@ -237,29 +237,6 @@ TEST(VerticalAlignment, TakesTheOffsetOfAPatchForThatOfTheImage) {
   EXPECT_NEAR(reference::offset_at(kSize, found, 10, 10), 0.5, 0.3);
 }
 
-TEST(VerticalAlignment, BringsTheRowsTogether) {
-  const Scene scene(kSize, {{0.5f, 0.2f, 0.1f, -0.4f}}), straight(kSize, 0.0f);
-  Video video(scene);
-  for (int frame = 0; frame < 3; ++frame) video.frame(scene);
-  const std::vector<int> aligned = download(video.context, video.aligned(scene), scene);
-  for (int y = 2; y < kSize.height - 2; ++y) {
-    for (int x = 0; x < kSize.width; ++x) {
-      const std::size_t i = pixel_count(kSize) + static_cast<std::size_t>(y) * kSize.width + x;
-      ASSERT_NEAR(aligned[i], straight.images[i], 6) << "at " << x << ", " << y;
-    }
-  }
-}
-
-TEST(VerticalAlignment, ResamplesByRowsFurtherDown) {
-  const std::vector<int> images{7, 8, 9, 10, 0, 10, 20, 40};
-  const auto resampled = [&](float offset_px) {
-    return reference::resample({1, 4}, same_everywhere(offset_px), images);
-  };
-  EXPECT_EQ(resampled(0.5f), (std::vector<int>{7, 8, 9, 10, 5, 15, 30, 40}));
-  EXPECT_EQ(resampled(-1.25f), (std::vector<int>{7, 8, 9, 10, 0, 0, 8, 18}));
-  EXPECT_EQ(resampled(0.0f), images);
-}
-
 TEST(VerticalAlignment, IsNotMisledByWrongMatchesOrByExposure) {
   Scene scene(kSize, -0.4f, PixelType::kU8, 1.0f);
   const testing::HostMaps wrong = testing::random_maps(kSize, 0, 60, 0, 29);

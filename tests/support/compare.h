@@ -35,6 +35,7 @@ template <typename T>
 /// The left view of `left` and the right one of `right`: what a stage leaves that works on the left view alone.
 template <typename T>
 std::vector<T> left_and_right(std::vector<T> left, const std::vector<T>& right) {
+  if (right.size() != left.size()) return {};
   const auto half = static_cast<std::ptrdiff_t>(left.size() / 2);
   std::copy(right.begin() + half, right.end(), left.begin() + half);
   return left;

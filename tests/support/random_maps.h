@@ -66,9 +66,11 @@ inline ::testing::AssertionResult same_maps(const HostMaps& actual, const HostMa
   return ::testing::AssertionSuccess();
 }
 
-/// Disparities and variances of the left view of `left` and the right one of `right`.
+/// The left view of `left` and the right one of `right`, of all that both have.
 inline HostMaps left_and_right(const HostMaps& left, const HostMaps& right) {
-  return {left_and_right(left.disparity, right.disparity), left_and_right(left.variance, right.variance)};
+  return {left_and_right(left.disparity, right.disparity), left_and_right(left.variance, right.variance),
+          left_and_right(left.hidden, right.hidden), left_and_right(left.doubtful, right.doubtful),
+          left_and_right(left.evidence, right.evidence)};
 }
 
 }  // namespace egosgm::testing

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the tests of stages share: memory on the device made of values, images made of grey values, names of cases.
+// What the tests of stages share: memory on the device made of values, images made of grey values, comparisons with the
+// reference, names of cases.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -7,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/reference/present_rows.h"
 #include "tests/support/compare.h"
 #include "tests/support/device.h"
 #include "tests/support/device_maps.h"
@@ -50,6 +52,27 @@ std::vector<T> in_padded_rows(shared::ImageSize size, const std::vector<T>& valu
   std::vector<T> padded(values.size() / columns * stride);
   for (std::size_t i = 0; i < values.size(); ++i) padded[i / columns * stride + i % columns] = values[i];
   return padded;
+}
+
+/// Runs a stage on single pixels and on vectors of them: of both views, of every second row of the right one, and of
+/// the left one alone. What `run(pixels, views)` gives must be what `twin(right_row_step)` does, and `before` in a
+/// right view that was left alone.
+template <typename Run, typename Twin>
+void expect_reference(shared::ImageSize size, const HostMaps& before, const Run& run, const Twin& twin) {
+  for (const int pixels : {1, 16}) {
+    for (const Views& views : {Views::kBoth, Views{2, 2}, Views::kLeft}) {
+      SCOPED_TRACE("by " + std::to_string(pixels) + ", " + std::to_string(views.count) + " views, row step " +
+                   std::to_string(views.right_row_step));
+      const HostMaps found = run(pixels, views);
+      HostMaps expected = twin(views.right_row_step);
+      if (found.variance.empty()) expected.variance.clear();
+      if (views == Views::kLeft) {
+        EXPECT_TRUE(same_maps(found, left_and_right(expected, before), size));
+      } else {
+        EXPECT_TRUE(same_maps(reference::without_absent_rows(size, views.right_row_step, found), expected, size));
+      }
+    }
+  }
 }
 
 inline std::string name_of(shared::ImageSize size) {
