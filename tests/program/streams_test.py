@@ -52,6 +52,10 @@ class StandardError(ProgramTest):
             self.assertEqual(process.wait(600), 130, arguments)
             process.stdout.close()
 
+    def test_an_error_that_no_one_reads_ends_the_program_as_any_other(self):
+        for redirection in self.REDIRECTIONS:
+            self.assertEqual(self.code_of(["run", "nowhere", "--out", self.folder / "never"], redirection), 2, redirection)
+
     def test_a_message_does_not_go_into_a_file(self):
         out = self.new_folder() / "poses.txt"
         self.assertEqual(self.code_of(["odometry", self.street, "--out", out], "2>&-"), 0)

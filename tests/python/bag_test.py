@@ -201,14 +201,17 @@ def test_a_calibration_takes_the_place_of_camera_infos(tmp_path, street, frames,
         refused(capfd, ["--bag", path, *TOPICS, *SET, *arguments], named)
 
 
-def test_the_nearest_partner_is_taken():
-    pairing = bags.Pairing(5)
-    pairs = []
-    for side, stamp in ((0, 10), (1, 6), (1, 11), (0, 20), (1, 19), (1, 21), (0, 30)):
+@pytest.mark.parametrize("stamps, left, right, is_told", [
+    (((0, 10), (1, 6), (1, 11), (0, 20), (1, 19), (1, 21), (0, 30)), 1, 2, True),
+    (((0, 10), (1, 6), (1, 11), (0, 20), (0, 24), (1, 19)), 1, 1, False)])  # nothing that is left is further apart than the bound
+def test_the_nearest_partner_is_taken(stamps, left, right, is_told):
+    pairing, pairs = bags.Pairing(5), []
+    for side, stamp in stamps:
         pairs += pairing.add(side, stamp, None)
     pairs += pairing.end()
-    assert [(left[0], right[0]) for left, right in pairs] == [(10, 11), (20, 19)]
-    assert pairing.gaps.unpaired_right == 2 and pairing.gaps.unpaired_left == 1
+    assert [(first[0], second[0]) for first, second in pairs] == [(10, 11), (20, 19)]
+    assert (pairing.gaps.unpaired_left, pairing.gaps.unpaired_right) == (left, right)
+    assert ("the nearest of them differ" in pairing.gaps.text()) == is_told
 
 
 def test_either_camera_may_be_the_raw_one(tmp_path, street, frames):
