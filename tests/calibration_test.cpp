@@ -88,36 +88,23 @@ TEST(Motion, RefusesWhatIsNotFinite) {
   }
 }
 
-TEST(Motion, RefusesWhatIsNoRotation) {
-  Motion motion = turned(0.2);
-  motion.current_from_previous.linear() *= 1.001;
-  expect_refused([&] { motion.validate(); }, {"motion: its 3x3 part is not a rotation", "give an orthonormal"});
-  motion = turned(0.2);
-  motion.current_from_previous.linear().col(0) *= -1;  // a mirror
-  expect_refused([&] { motion.validate(); }, {"motion: its 3x3 part is not a rotation"});
-  motion = turned(0.2);
-  motion.current_from_previous.linear()(0, 1) += 0.01;
-  expect_refused([&] { motion.validate(); }, {"motion: its 3x3 part is not a rotation"});
-  motion.current_from_previous.linear().setZero();
-  expect_refused([&] { motion.validate(); }, {"motion: its 3x3 part is not a rotation"});
-}
-
-TEST(Motion, RefusesAMatrixThatIsNotAffine) {
-  Motion motion = turned(0.2);
-  motion.current_from_previous.matrix()(3, 3) = 2;
-  expect_refused([&] { motion.validate(); }, {"motion: ", "0 0 0 1"});
-  motion = turned(0.2);
-  motion.current_from_previous.matrix().row(3).setZero();
-  expect_refused([&] { motion.validate(); }, {"motion: ", "0 0 0 1"});
-}
-
-TEST(Motion, RefusesWhatIsNoCovariance) {
-  Motion motion = turned(0.2);
-  motion.covariance(4, 4) = -1e-9;
-  expect_refused([&] { motion.validate(); }, {"motion: the covariance", "give zero if it is not known"});
-  motion.covariance.setIdentity();
-  motion.covariance(0, 3) = 0.01;
-  expect_refused([&] { motion.validate(); }, {"motion: the covariance is not symmetric"});
+TEST(Motion, RefusesWhatIsNoneBySayingWhy) {
+  const std::string no_rotation = "motion: its 3x3 part is not a rotation";
+  const std::pair<std::vector<std::string>, void (*)(Motion&)> cases[] = {
+      {{no_rotation, "give an orthonormal"}, [](Motion& m) { m.current_from_previous.linear() *= 1.001; }},
+      {{no_rotation}, [](Motion& m) { m.current_from_previous.linear().col(0) *= -1; }},  // a mirror
+      {{no_rotation}, [](Motion& m) { m.current_from_previous.linear()(0, 1) += 0.01; }},
+      {{no_rotation}, [](Motion& m) { m.current_from_previous.linear().setZero(); }},
+      {{"motion: ", "0 0 0 1"}, [](Motion& m) { m.current_from_previous.matrix()(3, 3) = 2; }},
+      {{"motion: ", "0 0 0 1"}, [](Motion& m) { m.current_from_previous.matrix().row(3).setZero(); }},
+      {{"motion: the covariance", "give zero if it is not known"}, [](Motion& m) { m.covariance(4, 4) = -1e-9; }},
+      {{"motion: the covariance is not symmetric"}, [](Motion& m) { m.covariance.setIdentity()(0, 3) = 0.01; }}};
+  for (const auto& [parts, spoil] : cases) {
+    Motion motion = turned(0.2);
+    spoil(motion);
+    SCOPED_TRACE(::testing::Message() << motion.current_from_previous.matrix() << "\n" << motion.covariance);
+    expect_refused([&] { motion.validate(); }, parts);
+  }
 }
 
 // A small motion exp(xi) after the first one of two is a small one after both: T2 exp(xi) T1 = exp(xi') T2 T1.

@@ -138,11 +138,6 @@ std::vector<BadFrame> bad_frames() {
       {"output search_width: a stride of 253 bytes is shorter than a row of 254",
        [](Frame& f) { f.outputs.debug.search_width.stride_bytes = 253; }},
       {"motion: not all values are finite", [](Frame& f) { f.motion->current_from_previous.translation().x() = kNan; }},
-      {"motion: its 3x3 part is not a rotation", [](Frame& f) { f.motion->current_from_previous.linear() *= 1.01; }},
-      {"motion: its 3x3 part is not a rotation (R R^T differs from 1 by 0.0",
-       [](Frame& f) { f.motion->current_from_previous.linear().col(0) *= -1; }},
-      {"motion: the last row", [](Frame& f) { f.motion->current_from_previous.matrix()(3, 0) = 1; }},
-      {"motion: the covariance", [](Frame& f) { f.motion->covariance(0, 0) = -1; }},
   };
 }
 

@@ -11,7 +11,7 @@ namespace {
 
 std::string text_of(Views views) {
   if (views == Views::kLeft) return "left";
-  return views.right_row_step == 1 ? "both" : "both, half of the right rows";
+  return views.right_row_step == 1 ? "both" : "both, halved";  // the right rows
 }
 
 /// What is decided, in a row.
@@ -47,12 +47,7 @@ constexpr Case kCases[] = {
     {true, kBand, false, kFirstFrame, false, "first frame | everything | tracks left | matches both x1"},
     {true, kBand, false, kReset, true, "reset | everything | tracks left | matches both x1"},
     {true, kBand, false, kReset, false, "reset | everything | tracks left | matches both x1"},
-    {true,
-     kBand,
-     true,
-     {},
-     true,
-     "- | bands | tracks both, half of the right rows | matches both, half of the right rows x1 | coarse"},
+    {true, kBand, true, {}, true, "- | bands | tracks both, halved | matches both, halved x1 | coarse"},
     {true, kBand, true, {}, false, "no motion | everything | tracks both | matches both x1"},
     {true, kBand, true, kFirstFrame, true, "first frame | everything | tracks both | matches both x1"},
     {true, kBand, true, kFirstFrame, false, "first frame | everything | tracks both | matches both x1"},
@@ -108,8 +103,7 @@ TEST(Plan, MatchesTwiceWhereTheFirstMatchGivesTheVerticalOffset) {
 TEST(Plan, HasACoarseMatchOnlyWhereItIsOn) {
   MethodOptions options;
   options.coarse_match.enabled = false;
-  EXPECT_EQ(row(options, {}, true, true),
-            "- | bands | tracks both, half of the right rows | matches both, half of the right rows x1");
+  EXPECT_EQ(row(options, {}, true, true), "- | bands | tracks both, halved | matches both, halved x1");
 }
 
 TEST(Plan, MakesOnlyWhatIsWanted) {

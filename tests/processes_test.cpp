@@ -64,37 +64,22 @@ TEST(BeginInThreads, ListDevices) {
   }
 }
 
-TEST(BeginInThreads, MakePipelines) {
-  const ShortVideo video;
-  ASSERT_EQ(status_of([&] { return !video.through(Device::select()).empty(); }), 0);  // fills the driver's cache
-  for (int process = 0; process < processes(); ++process) {
-    ASSERT_EQ(status_of([&] {
-                return in_threads([&] {
-                  const Pipeline pipeline = video.pipeline(Device::select());
-                  return pipeline.device_memory_bytes() > 0;
-                });
-              }),
-              0)
-        << process;
-  }
-}
-
 TEST(BeginInThreads, GiveTheBitsOfOneThread) {
   const ShortVideo video;
-  ASSERT_EQ(status_of([&] {
-              std::atomic<int> threads{0};
-              std::vector<std::vector<OutputMemory>> outputs(kThreads);
-              return in_threads([&] {
-                       outputs[threads++] = video.through(Device::select());
-                       return true;
-                     }) &&
-                     std::all_of(outputs.begin(), outputs.end(), [&](const std::vector<OutputMemory>& frames) {
-                       return std::equal(
-                           frames.begin(), frames.end(), outputs[0].begin(), outputs[0].end(),
-                           [](const auto& a, const auto& b) { return bool(same_outputs(a, b, ShortVideo::kSize)); });
-                     });
-            }),
-            0);
+  ASSERT_EQ(status_of([&] { return !video.through(Device::select()).empty(); }), 0);  // fills the driver's cache
+  const auto give_the_same = [&] {
+    std::atomic<int> threads{0};
+    std::vector<std::vector<OutputMemory>> outputs(kThreads);
+    const auto through_a_pipeline = [&] {
+      outputs[threads++] = video.through(Device::select());
+      return true;
+    };
+    return in_threads(through_a_pipeline) &&
+           std::all_of(outputs.begin(), outputs.end(), [&](const std::vector<OutputMemory>& frames) {
+             return bool(same_outputs(frames, outputs[0], ShortVideo::kSize));
+           });
+  };
+  for (int process = 0; process < processes(); ++process) ASSERT_EQ(status_of(give_the_same), 0) << process;
 }
 
 /// Whether `call` throws the error of a forked process, with its remedy.
