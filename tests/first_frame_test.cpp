@@ -13,6 +13,7 @@
 #include "host/frame/frame_queue.h"
 #include "host/tuning_defaults.h"
 #include "tests/support/device.h"
+#include "tests/support/files.h"
 #include "tests/support/pipeline_video.h"
 
 namespace egosgm::testing {
@@ -23,14 +24,7 @@ namespace fs = std::filesystem;
 /// PoCL's cache of this process alone: machine code as it is made.
 class Cache {
  public:
-  Cache() {
-    std::string name = (fs::temp_directory_path() / "egosgm-cache-XXXXXX").string();
-    folder_ = ::mkdtemp(name.data());
-    ::setenv("POCL_CACHE_DIR", folder_.c_str(), 1);
-  }
-  ~Cache() { fs::remove_all(folder_); }
-  Cache(const Cache&) = delete;
-  Cache& operator=(const Cache&) = delete;
+  Cache() { ::setenv("POCL_CACHE_DIR", folder_.c_str(), 1); }
 
   std::set<std::string> files() const {
     std::set<std::string> all;
@@ -47,7 +41,8 @@ class Cache {
   }
 
  private:
-  fs::path folder_;
+  const TemporaryFolder temporary_;
+  const fs::path& folder_ = temporary_.path();
 };
 
 const Cache cache;  // before the driver is there

@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The same bits wherever a frame is computed: on parts of a device, by programs compiled ahead, without a compiler.
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <filesystem>
-#include <fstream>
 #include <functional>
-#include <iterator>
+#include <memory>
 #include <thread>
 
 #include "egosgm/error.h"
@@ -14,6 +12,7 @@
 #include "host/method_options.h"
 #include "tests/support/expect_refused.h"
 #include "tests/support/fault_layer.h"
+#include "tests/support/files.h"
 #include "tests/support/short_video.h"
 
 namespace egosgm {
@@ -40,13 +39,6 @@ TEST(ComputeUnits, GiveTheBitsOfTheWholeDevice) {
   for (const auto& outputs : actual) EXPECT_TRUE(same_outputs(outputs, expected, ShortVideo::kSize));
 }
 
-std::string read(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
-
-void write(const fs::path& file, const std::string& bytes) { std::ofstream(file, std::ios::binary) << bytes; }
-
 std::string replaced(std::string text, const std::string& what, const std::string& by) {
   const auto at = text.find(what);
   EXPECT_NE(at, std::string::npos) << what;
@@ -58,17 +50,17 @@ class CompiledTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     const testing::FaultLayer layer(FAULT_LAYER);
-    folder_ = fs::path(::testing::TempDir()) / ("egosgm_programs_" + std::to_string(getpid()));
-    fs::create_directory(folder_);
+    temporary_ = std::make_unique<TemporaryFolder>();
+    folder_ = temporary_->path();
     for (const Scheduling scheduling : {Scheduling::kWavefront, Scheduling::kPaths}) {
       const fs::path folder = folder_ / (scheduling == Scheduling::kPaths ? "paths" : "wavefront");
       fs::create_directory(folder);
       for (const ProgramFile& file : compile_programs(Device::select(), options(scheduling))) {
-        write(folder / file.name, file.bytes);
+        write_bytes(folder / file.name, file.bytes);
       }
     }
   }
-  static void TearDownTestSuite() { fs::remove_all(folder_); }
+  static void TearDownTestSuite() { temporary_.reset(); }
 
   void TearDown() override { layer_.forbid_sources(0); }
 
@@ -93,6 +85,7 @@ class CompiledTest : public ::testing::Test {
   }
 
   const testing::FaultLayer layer_{FAULT_LAYER};
+  static inline std::unique_ptr<TemporaryFolder> temporary_;
   static inline fs::path folder_;
 };
 
@@ -126,27 +119,27 @@ TEST_F(CompiledTest, ProgramsOfADeviceServeItsComputeUnits) {
 }
 
 TEST_F(CompiledTest, ProgramsOfAnotherDeviceAreRefused) {
-  const std::string manifest = read(folder_ / "wavefront/manifest.json");
+  const std::string manifest = read_bytes(folder_ / "wavefront/manifest.json");
   for (const std::string name : {"device", "device_version", "driver", "platform", "platform_version"}) {
     const fs::path folder = copied();
     const std::string field = '"' + name + "\": \"";
-    write(folder / "manifest.json", replaced(manifest, field, field + "Other "));
+    write_bytes(folder / "manifest.json", replaced(manifest, field, field + "Other "));
     expect_no_pipeline(folder, {"manifest.json: made for " + name + " \"Other ", "here it is", "egosgm compile"});
   }
 }
 
 TEST_F(CompiledTest, ProgramsOfOtherSourceOrOptionsAreRefused) {
   fs::path folder = copied();
-  const std::string manifest = read(folder / "manifest.json");
+  const std::string manifest = read_bytes(folder / "manifest.json");
   const std::string field = "\"source_hash\": \"";
   const auto digit = manifest.find(field) + field.size();
   std::string changed = manifest;
   changed[digit] = changed[digit] == '0' ? '1' : '0';
-  write(folder / "manifest.json", changed);
+  write_bytes(folder / "manifest.json", changed);
   expect_no_pipeline(folder, {"compiled from another version of the source", "egosgm compile"});
 
   folder = copied();
-  write(folder / "manifest.json", replaced(manifest, "-DMAX_CHUNKS=4", "-DMAX_CHUNKS=6"));
+  write_bytes(folder / "manifest.json", replaced(manifest, "-DMAX_CHUNKS=4", "-DMAX_CHUNKS=6"));
   expect_no_pipeline(folder, {"has no banded_sgm.cl built with -", "-DMAX_CHUNKS=4", "egosgm compile"});
 }
 
@@ -154,12 +147,12 @@ TEST_F(CompiledTest, BrokenFoldersAreRefused) {
   expect_no_pipeline(folder_ / "nowhere", {"nowhere/manifest.json", "egosgm compile"});
   for (const std::string text : {"", "no JSON", "[]", "{}", "{\"format\": 2}", "{\"format\": 1}"}) {
     const fs::path folder = copied();
-    write(folder / "manifest.json", text);
+    write_bytes(folder / "manifest.json", text);
     expect_no_pipeline(folder, {"manifest.json", "egosgm compile"});
   }
   for (const auto& change : std::vector<std::function<void(const fs::path&)>>{
            [](const fs::path& file) { fs::resize_file(file, fs::file_size(file) - 1); },
-           [](const fs::path& file) { write(file, ""); }, [](const fs::path& file) { fs::remove(file); }}) {
+           [](const fs::path& file) { write_bytes(file, ""); }, [](const fs::path& file) { fs::remove(file); }}) {
     const fs::path folder = copied();
     for (const auto& entry : fs::directory_iterator(folder)) {
       if (entry.path().filename().string().starts_with("banded_sgm-")) change(entry.path());

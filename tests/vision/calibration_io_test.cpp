@@ -6,8 +6,8 @@
 #include <ctime>
 
 #include "tests/support/expect_refused.h"
+#include "tests/support/files.h"
 #include "tests/vision/data_folder.h"
-#include "tests/vision/temporary_folder.h"
 #include "vision/file_io.h"
 
 namespace egosgm::vision {
@@ -78,12 +78,10 @@ TEST_F(CalibrationIo, WrittenCalibrationIsReadBackExactly) {
   const Calibration written{721.5377, 1.0 / 3, 609.5593, -172.854, 0.53715, 1e-7};
   write_calibration(file_, written);
   const Calibration read_back = read_calibration(file_);
-  EXPECT_EQ(read_back.fx, written.fx);
-  EXPECT_EQ(read_back.fy, written.fy);
-  EXPECT_EQ(read_back.cx, written.cx);
-  EXPECT_EQ(read_back.cy, written.cy);
-  EXPECT_EQ(read_back.baseline_m, written.baseline_m);
-  EXPECT_EQ(read_back.doffs_px, written.doffs_px);
+  for (const auto value : {&Calibration::fx, &Calibration::fy, &Calibration::cx, &Calibration::cy,
+                           &Calibration::baseline_m, &Calibration::doffs_px}) {
+    EXPECT_EQ(read_back.*value, written.*value);
+  }
   expect_refused([&] { write_calibration(file_, {}); }, {"calibration: fx"});
 }
 

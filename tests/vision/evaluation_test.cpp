@@ -7,9 +7,9 @@
 
 #include "egosgm/vision/disparity_io.h"
 #include "tests/support/expect_refused.h"
+#include "tests/support/files.h"
 #include "tests/vision/data_folder.h"
 #include "tests/vision/images.h"
-#include "tests/vision/temporary_folder.h"
 #include "vision/file_io.h"
 #include "vision/pair_with_truth.h"
 
@@ -20,30 +20,31 @@ using testing::expect_refused;
 
 constexpr float kNo = kInvalidDisparity;
 
+/// All but the sky's.
+std::vector<std::int64_t> numbers(const DisparityCounts& c) {
+  return {c.truth, c.valid, c.bad, c.d1, c.bad_interpolated, c.d1_interpolated, c.bad_1px};
+}
+
 TEST(Evaluation, CountsByTheRules) {
   // Errors: 3 (good), 3.5 of 100 (bad, not D1), 6 of 100 (bad and D1), missing (filled with 106: 6, bad), no truth.
   const Image truth = map_from(1, {100, 100, 100, 112, kNo});
   const Image estimate = map_from(1, {97, 103.5f, 106, kNo, 200});
   const DisparityCounts counts = compare_disparity(estimate, truth);
-  EXPECT_EQ(counts.truth, 4);
-  EXPECT_EQ(counts.valid, 3);
-  EXPECT_EQ(counts.bad, 2);
-  EXPECT_EQ(counts.d1, 1);
-  EXPECT_EQ(counts.bad_interpolated, 3);
-  EXPECT_EQ(counts.d1_interpolated, 2);
+  EXPECT_EQ(numbers(counts), (std::vector<std::int64_t>{4, 3, 2, 1, 3, 2, 3}));
   EXPECT_DOUBLE_EQ(counts.absolute_error_px, 12.5);
   EXPECT_DOUBLE_EQ(counts.signed_error_px, 6.5);
-  EXPECT_EQ(counts.bad_1px, 3);
   const DisparityMetrics metrics = metrics_of(counts);
-  EXPECT_DOUBLE_EQ(metrics.bad_or_missing, 75);
-  EXPECT_DOUBLE_EQ(metrics.bad_of_valid, 200.0 / 3);
-  EXPECT_DOUBLE_EQ(metrics.density, 75);
-  EXPECT_DOUBLE_EQ(metrics.interpolated, 75);
-  EXPECT_DOUBLE_EQ(metrics.d1, 50);
-  EXPECT_DOUBLE_EQ(metrics.d1_interpolated, 50);
-  EXPECT_DOUBLE_EQ(metrics.mae_px, 12.5 / 3);
-  EXPECT_DOUBLE_EQ(metrics.mean_error_px, 6.5 / 3);
-  EXPECT_DOUBLE_EQ(metrics.bad_1px, 100) << "three of four, and a hole";
+  const std::tuple<const char*, double, double> expected[] = {
+      {"bad or missing", metrics.bad_or_missing, 75},
+      {"bad of valid", metrics.bad_of_valid, 200.0 / 3},
+      {"density", metrics.density, 75},
+      {"interpolated", metrics.interpolated, 75},
+      {"D1", metrics.d1, 50},
+      {"D1 interpolated", metrics.d1_interpolated, 50},
+      {"MAE", metrics.mae_px, 12.5 / 3},
+      {"mean error", metrics.mean_error_px, 6.5 / 3},
+      {"bad at 1 px", metrics.bad_1px, 100}};  // three of four, and a hole
+  for (const auto& [name, value, known] : expected) EXPECT_DOUBLE_EQ(value, known) << name;
 }
 
 TEST(Evaluation, AHoleInTheSkyIsRightAndASurfaceThereIsWrong) {
@@ -172,6 +173,7 @@ TEST_F(PairWithTruth, EqualNames) {
   const EvaluationPairs result = pair("e", "t");
   ASSERT_EQ(result.pairs.size(), 1u);
   EXPECT_EQ(result.pairs[0].truth, folder_ / "t/000002.pfm");
+  EXPECT_TRUE(result.pairs[0].same_name);
   EXPECT_EQ(result.without_estimate, (std::vector<std::filesystem::path>{folder_ / "t/000003.png"}));
   EXPECT_EQ(pair("e/000002.png", "t").pairs.size(), 1u);
   EXPECT_TRUE(pair("e/000002.png", "t").without_estimate.empty());
@@ -184,19 +186,12 @@ TEST_F(PairWithTruth, FrameNumberWhereNoNamesAreEqual) {
     const EvaluationPairs result = pair("out", truth);
     ASSERT_EQ(result.pairs.size(), 1u);
     EXPECT_EQ(result.pairs[0].estimate, folder_ / "out/disparity/000010.png");
+    EXPECT_EQ(result.pairs[0].name, "000010");
+    EXPECT_FALSE(result.pairs[0].same_name);
   }
+  EXPECT_EQ(pair("out", "t").without_truth, (std::vector<std::filesystem::path>{folder_ / "out/disparity/000009.png"}));
   add("t/000138_10.png");
   expect_refused([&] { pair("out", "t"); }, {"000010.png", "000138_10.png", "000151_10.png", "one truth file"});
-}
-
-TEST_F(PairWithTruth, WhatIsPairedByNumberOnlyIsSaid) {
-  add("e/000009.png"), add("e/000010.png"), add("t/000151_10.png");
-  const EvaluationPairs result = pair("e", "t");
-  ASSERT_EQ(result.pairs.size(), 1u);
-  EXPECT_EQ(result.pairs[0].name, "000010");
-  EXPECT_FALSE(result.pairs[0].same_name);
-  EXPECT_EQ(result.without_truth, (std::vector<std::filesystem::path>{folder_ / "e/000009.png"}));
-  EXPECT_TRUE(pair("e", "e").pairs[0].same_name);
 }
 
 TEST_F(PairWithTruth, ImageNamesFindTheTruthOfTheirScene) {
@@ -243,17 +238,13 @@ TEST_F(PairWithTruth, OnlyChosenFrames) {
   EXPECT_EQ(result.without_truth, (std::vector<std::filesystem::path>{folder_ / "e/000009.png"}));
 }
 
-TEST_F(PairWithTruth, TwoMapsOfOneName) {
-  add("e/000001.png"), add("e/000001.pfm"), add("t/000001.png");
-  expect_refused([&] { pair("e", "t"); }, {"e/000001.p", "has the name of"});
-}
-
-TEST_F(PairWithTruth, NothingThatFits) {
-  add("e/000001.png"), add("t/000002.png");
+TEST_F(PairWithTruth, NothingThatFitsOrTwoOfOneName) {
+  add("e/000001.png"), add("t/000002.png"), add("two/000002.png"), add("two/000002.pfm");
   make_folder(folder_ / "empty");
   expect_refused([&] { pair("e", "t"); }, {"nothing there belongs"});
   expect_refused([&] { pair("e", "empty"); }, {"empty", "holds no .png or .pfm"});
   expect_refused([&] { pair("none", "t"); }, {"none", "no such file"});
+  expect_refused([&] { pair("two", "t"); }, {"two/000002.p", "has the name of"});
 }
 
 }  // namespace

@@ -14,7 +14,7 @@
 #include <thread>
 
 #include "tests/support/expect_refused.h"
-#include "tests/vision/temporary_folder.h"
+#include "tests/support/files.h"
 
 namespace egosgm::vision {
 namespace {

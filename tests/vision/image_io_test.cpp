@@ -15,7 +15,7 @@
 #include "egosgm/vision/opencv.h"
 #include "tests/fuzz/png_seed.h"
 #include "tests/support/expect_refused.h"
-#include "tests/vision/temporary_folder.h"
+#include "tests/support/files.h"
 #include "vision/file_io.h"
 
 namespace egosgm::vision {

@@ -34,6 +34,14 @@ inline Image picture_of(Size size, Color color) {
   return picture;
 }
 
+/// Calls `f(x, y)` row by row.
+template <typename F>
+void for_each_pixel(Size size, F&& f) {
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) f(x, y);
+  }
+}
+
 /// All values, row by row.
 inline std::vector<double> values_of(const Image& image) {
   std::vector<double> values;
@@ -53,7 +61,10 @@ inline double largest_difference(const Image& a, const Image& b) {
   if (a.size() != b.size() || a.type != b.type) return std::numeric_limits<double>::infinity();
   const std::vector<double> of_a = values_of(a), of_b = values_of(b);
   double largest = 0;
-  for (std::size_t i = 0; i < of_a.size(); ++i) largest = std::max(largest, std::abs(of_a[i] - of_b[i]));
+  for (std::size_t i = 0; i < of_a.size(); ++i) {
+    const double apart = of_a[i] == of_b[i] ? 0 : std::abs(of_a[i] - of_b[i]);
+    largest = std::isnan(apart) ? std::numeric_limits<double>::infinity() : std::max(largest, apart);
+  }
   return largest;
 }
 

@@ -12,6 +12,7 @@
 
 #include "egosgm/error.h"
 #include "egosgm/vision/synthetic.h"
+#include "tests/vision/images.h"
 #include "vision/pixel_motion.h"
 #include "vision/window_sums.h"
 
@@ -21,17 +22,13 @@ namespace {
 constexpr int kFirst = 3, kFrames = 4;  // frames in which the bus ahead is seen whole
 
 const SyntheticSequence& street() {
-  static const SyntheticSequence sequence([] {
-    SyntheticOptions options;
-    options.frames = kFirst + kFrames + 1;
-    options.width = 480;
-    options.height = 180;
-    options.seed = 3;
-    options.moving_object = true;
-    options.noise_grey = 0.5;
-    options.supersampling = 2;
-    return options;
-  }());
+  static const SyntheticSequence sequence({.frames = kFirst + kFrames + 1,
+                                           .width = 480,
+                                           .height = 180,
+                                           .seed = 3,
+                                           .moving_object = true,
+                                           .noise_grey = 0.5,
+                                           .supersampling = 2});
   return sequence;
 }
 
@@ -59,25 +56,18 @@ LabelledObjects process(ObjectTracker& tracker, int frame, bool has_motion = tru
 const MovingObject* found_at(const LabelledObjects& found, const Truth& truth) {
   for (const MovingObject& object : found.moving) {
     int common = 0, either = 0;
-    for (int y = 0; y < truth.labels.rows; ++y) {
-      for (int x = 0; x < truth.labels.cols; ++x) {
-        const bool is_true = truth.labels.at<std::uint8_t>(y, x) == truth.object.id;
-        const bool is_own = found.labels.at<std::uint8_t>(y, x) == object.id;
-        common += is_true && is_own;
-        either += is_true || is_own;
-      }
-    }
+    for_each_pixel(truth.labels.size(), [&](int x, int y) {
+      const bool is_true = truth.labels.at<std::uint8_t>(y, x) == truth.object.id;
+      const bool is_own = found.labels.at<std::uint8_t>(y, x) == object.id;
+      common += is_true && is_own;
+      either += is_true || is_own;
+    });
     if (common > 0.7 * either) return &object;
   }
   return nullptr;
 }
 
-bool is_empty(const Image& labels) {
-  for (int y = 0; y < labels.rows; ++y) {
-    if (std::any_of(labels.row(y), labels.row(y) + labels.cols, [](auto label) { return label != 0; })) return false;
-  }
-  return true;
-}
+bool is_empty(const Image& labels) { return count_nonzero(labels) == 0; }
 
 TEST(MovingObjects, VehicleHasItsMotionInEachFrame) {
   ObjectTracker tracker(street().calibration());
@@ -116,19 +106,17 @@ TEST(MovingObjects, SceneFlowIsThatOfTheEarlierFrame) {
   const SyntheticSceneFlow truth = street().scene_flow(kFirst);
   const Truth vehicle = largest(kFirst);
   int asked = 0, right = 0, still = 0, still_right = 0;
-  for (int y = 0; y < truth.flow.rows; ++y) {
-    for (int x = 0; x < truth.flow.cols; ++x) {
-      const float *own = flow->flow.row<float>(y) + 2 * x, *exact = truth.flow.row<float>(y) + 2 * x;
-      if (std::isnan(exact[0]) || !truth.seen_next.at<std::uint8_t>(y, x)) continue;
-      const bool is_right = std::hypot(own[0] - exact[0], own[1] - exact[1]) < 1 &&
-                            std::abs(flow->next_disparity.at<float>(y, x) - truth.next_disparity.at<float>(y, x)) < 1;
-      const int label = truth.objects.at<std::uint8_t>(y, x);
-      asked += label == vehicle.object.id;
-      right += label == vehicle.object.id && is_right;
-      still += label == 0;
-      still_right += label == 0 && is_right;
-    }
-  }
+  for_each_pixel(truth.flow.size(), [&](int x, int y) {
+    const float *own = flow->flow.row<float>(y) + 2 * x, *exact = truth.flow.row<float>(y) + 2 * x;
+    if (std::isnan(exact[0]) || !truth.seen_next.at<std::uint8_t>(y, x)) return;
+    const bool is_right = std::hypot(own[0] - exact[0], own[1] - exact[1]) < 1 &&
+                          std::abs(flow->next_disparity.at<float>(y, x) - truth.next_disparity.at<float>(y, x)) < 1;
+    const int label = truth.objects.at<std::uint8_t>(y, x);
+    asked += label == vehicle.object.id;
+    right += label == vehicle.object.id && is_right;
+    still += label == 0;
+    still_right += label == 0 && is_right;
+  });
   EXPECT_GT(right, 0.9 * asked);
   EXPECT_GT(still_right, 0.97 * still);
   const LabelledObjects earlier{flow->moving, flow->labels};
@@ -144,24 +132,18 @@ TEST(MovingObjects, SceneFlowIsThatOfTheEarlierFrame) {
 
 TEST(MovingObjects, WhatStandsIsNoObject) {
   ObjectTracker tracker(street().calibration());
-  const Image marks(street().render(0).left.size(), kU8, 255);
   for (int k = kFirst; k < kFirst + 3; ++k) {
     const SyntheticFrame images = street().render(k);
-    Image marked = marks.clone();
-    for (int y = 0; y < marked.rows; ++y) {
-      for (int x = 0; x < marked.cols; ++x) {
-        // Blocks of what stands: the mask is wrong there.
-        const bool is_block = x / 40 % 2 == 0 && y / 40 % 2 == 0;
-        if (!is_block || images.left_moving.at<std::uint8_t>(y, x)) marked.at<std::uint8_t>(y, x) = 0;
-      }
-    }
+    Image marked(images.left.size(), kU8, 0);
+    for_each_pixel(marked.size(), [&](int x, int y) {
+      const bool is_block = x / 40 % 2 == 0 && y / 40 % 2 == 0;  // of what stands: the mask is wrong there
+      if (is_block && !images.left_moving.at<std::uint8_t>(y, x)) marked.at<std::uint8_t>(y, x) = 255;
+    });
     const LabelledObjects found = tracker.process(images.left, images.left_disparity, marked, street().motion(k));
     int labelled = 0;
-    for (int y = 0; y < marked.rows; ++y) {
-      for (int x = 0; x < marked.cols; ++x) {
-        labelled += found.labels.at<std::uint8_t>(y, x) && !images.left_moving.at<std::uint8_t>(y, x);
-      }
-    }
+    for_each_pixel(marked.size(), [&](int x, int y) {
+      labelled += found.labels.at<std::uint8_t>(y, x) && !images.left_moving.at<std::uint8_t>(y, x);
+    });
     EXPECT_LT(labelled, 0.005 * static_cast<double>(marked.pixels())) << k;
   }
 }
@@ -193,14 +175,12 @@ TEST(MovingObjects, WhatLooksOtherwiseGoesOnAndBeginsWhereItsMotionExplainsFarMo
   for (const int amplitude : {15, 20}) {
     SyntheticFrame images = street().render(kFirst + 2);
     std::mt19937 random(5);
-    for (int y = 0; y < images.left.rows; ++y) {
-      for (int x = 0; x < images.left.cols; ++x) {
-        if (truth.labels.at<std::uint8_t>(y, x) != truth.object.id) continue;
-        std::uint8_t& grey = images.left.at<std::uint8_t>(y, x);
-        const int noise = static_cast<int>(random() % static_cast<unsigned>(2 * amplitude + 1)) - amplitude;
-        grey = static_cast<std::uint8_t>(std::clamp(grey + noise, 0, 255));
-      }
-    }
+    for_each_pixel(images.left.size(), [&](int x, int y) {
+      if (truth.labels.at<std::uint8_t>(y, x) != truth.object.id) return;
+      std::uint8_t& grey = images.left.at<std::uint8_t>(y, x);
+      const int noise = static_cast<int>(random() % static_cast<unsigned>(2 * amplitude + 1)) - amplitude;
+      grey = static_cast<std::uint8_t>(std::clamp(grey + noise, 0, 255));
+    });
     for (const bool is_known : {true, false}) {
       ObjectTracker tracker(street().calibration());
       if (is_known) process(tracker, kFirst, false);
@@ -217,18 +197,14 @@ TEST(MovingObjects, ImagesOf16BitsAndMapsWithoutValues) {
   for (int k = kFirst; k < kFirst + 2; ++k) {
     const SyntheticFrame images = street().render(k);
     Image wide(images.left.size(), kU16);
-    for (int y = 0; y < wide.rows; ++y) {
-      for (int x = 0; x < wide.cols; ++x) {
-        wide.at<std::uint16_t>(y, x) = static_cast<std::uint16_t>(256 * images.left.at<std::uint8_t>(y, x));
-      }
-    }
+    for_each_pixel(wide.size(), [&](int x, int y) {
+      wide.at<std::uint16_t>(y, x) = static_cast<std::uint16_t>(256 * images.left.at<std::uint8_t>(y, x));
+    });
     const LabelledObjects found = tracker.process(wide, images.left_disparity, images.left_moving, street().motion(k));
     const LabelledObjects expected =
         of_8_bits.process(images.left, images.left_disparity, images.left_moving, street().motion(k));
     EXPECT_EQ(found.moving.empty(), k == kFirst);
-    for (int y = 0; y < wide.rows; ++y) {
-      EXPECT_TRUE(std::equal(found.labels.row(y), found.labels.row(y) + wide.cols, expected.labels.row(y))) << y;
-    }
+    EXPECT_EQ(largest_difference(found.labels, expected.labels), 0);
   }
   const Image black(tracker
                         .process(Image(180, 480, kU8, 0), Image(180, 480, kF32, kInvalidDisparity),
@@ -279,19 +255,13 @@ TEST(MovingObjects, PixelsThatCandidatesShareCountOnce) {
   for (int k = kFirst; k < kFirst + kFrames; ++k) {
     const SyntheticFrame images = street().render(k);
     Image marked = images.left_moving.clone();
-    for (int y = 0; y < marked.rows; ++y) {
-      for (int x = 0; x < marked.cols; ++x) {
-        if (x % 32 < 8) marked.at<std::uint8_t>(y, x) = 0;
-      }
-    }
+    for_each_pixel(marked.size(), [&](int x, int y) {
+      if (x % 32 < 8) marked.at<std::uint8_t>(y, x) = 0;
+    });
     const LabelledObjects found = tracker.process(images.left, images.left_disparity, marked, street().motion(k));
     for (const MovingObject& object : found.moving) {
-      int pixels = 0;
-      for (int y = 0; y < marked.rows; ++y) {
-        const std::uint8_t* row = found.labels.row(y);
-        pixels += static_cast<int>(std::count(row, row + marked.cols, object.id));
-      }
-      EXPECT_EQ(object.pixels, pixels) << "object " << object.id << " of frame " << k;
+      const std::vector<double> labels = values_of(found.labels);
+      EXPECT_EQ(object.pixels, std::count(labels.begin(), labels.end(), object.id)) << object.id << " of frame " << k;
       has_any = true;
     }
   }
@@ -305,16 +275,20 @@ TEST(MovingObjects, RefusalsLeaveTheState) {
   const SyntheticFrame images = street().render(kFirst + 1);
   const Motion motion = street().motion(kFirst + 1);
   const Image small(10, 10, kU8, 0), small_map(10, 10, kF32, 1);
-  EXPECT_THROW(tracker.process(images.left, images.left_disparity, small, motion), InvalidArgument);
-  EXPECT_THROW(tracker.process(images.left, images.left_moving, images.left_moving, motion), InvalidArgument);
-  EXPECT_THROW(tracker.process(images.left, images.left_disparity, images.left_disparity, motion), InvalidArgument);
-  EXPECT_THROW(tracker.process(images.left_disparity, images.left_disparity, images.left_moving, motion),
-               InvalidArgument);
-  EXPECT_THROW(tracker.process(small, small_map, small, motion), InvalidArgument);
-  EXPECT_THROW(tracker.process(Image(), Image(), Image(), motion), InvalidArgument);
   Motion none;
   none.current_from_previous.linear() *= 2;
-  EXPECT_THROW(tracker.process(images.left, images.left_disparity, images.left_moving, none), InvalidArgument);
+  const std::tuple<Image, Image, Image, Motion> refused[] = {
+      {images.left, images.left_disparity, small, motion},
+      {images.left, images.left_moving, images.left_moving, motion},
+      {images.left, images.left_disparity, images.left_disparity, motion},
+      {images.left_disparity, images.left_disparity, images.left_moving, motion},
+      {small, small_map, small, motion},
+      {Image(), Image(), Image(), motion},
+      {images.left, images.left_disparity, images.left_moving, none}};
+  for (std::size_t i = 0; i < std::size(refused); ++i) {
+    EXPECT_THROW(std::apply([&](const auto&... given) { tracker.process(given...); }, refused[i]), InvalidArgument)
+        << i;
+  }
   EXPECT_TRUE(found_at(process(tracker, kFirst + 1), largest(kFirst + 1)));
 }
 

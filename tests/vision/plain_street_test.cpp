@@ -6,8 +6,8 @@
 
 #include "egosgm/vision/disparity_io.h"
 #include "egosgm/vision/synthetic.h"
+#include "tests/support/files.h"
 #include "tests/vision/images.h"
-#include "tests/vision/temporary_folder.h"
 
 namespace egosgm::vision {
 namespace {
@@ -70,13 +70,11 @@ TEST(PlainStreet, TheSkyIsReadBackAsNothing) {
   const SyntheticFrame frame = SyntheticSequence(options).render(0);
   const Image truth = read_disparity(folder / "street/truth/left_disp_occ/000000.png");
   int sky = 0;
-  for (int y = 0; y < truth.rows; ++y) {
-    for (int x = 0; x < truth.cols; ++x) {
-      const float d = frame.left_disparity.at<float>(y, x);
-      ASSERT_EQ(is_sky(truth.at<float>(y, x)), d < 2.0f / 256) << "at " << x << ", " << y << ": " << d;
-      sky += d == 0;
-    }
-  }
+  for_each_pixel(truth.size(), [&](int x, int y) {
+    const float d = frame.left_disparity.at<float>(y, x);
+    ASSERT_EQ(is_sky(truth.at<float>(y, x)), d < 2.0f / 256) << "at " << x << ", " << y << ": " << d;
+    sky += d == 0;
+  });
   EXPECT_GT(sky, 1000);
 }
 

@@ -9,8 +9,8 @@
 #include "egosgm/error.h"
 #include "egosgm/image.h"
 #include "egosgm/vision/image_io.h"
+#include "tests/support/files.h"
 #include "tests/vision/images.h"
-#include "tests/vision/temporary_folder.h"
 #include "vision/file_io.h"
 
 namespace egosgm::vision {

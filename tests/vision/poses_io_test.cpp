@@ -6,8 +6,8 @@
 #include <random>
 
 #include "tests/support/expect_refused.h"
+#include "tests/support/files.h"
 #include "tests/vision/data_folder.h"
-#include "tests/vision/temporary_folder.h"
 #include "vision/file_io.h"
 
 namespace egosgm::vision {
