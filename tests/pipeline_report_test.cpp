@@ -12,7 +12,8 @@
 namespace egosgm::testing {
 namespace {
 
-// What is predicted and what is searched are two things: see `search=full` and SearchesEverythingAfterAWrongPrediction.
+// What is predicted and what is searched are two things: with `search=full`, a frame is predicted and searches
+// everything.
 TEST(Pipeline, SaysWhyNothingWasPredictedAndWhatWasSearched) {
   Setting setting = standard();
   const Video video(setting, 3);

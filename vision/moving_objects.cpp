@@ -293,7 +293,7 @@ bool ObjectTracker::State::label(Candidate& candidate) const {
   for (const Pixel& p : candidate.group.pixels) disparities.push_back(disparity(p));
   const auto last = static_cast<double>(disparities.size() - 1);
   const double low = nth_value(disparities, static_cast<std::size_t>(0.06 * last));
-  const double high = nth_value(disparities, static_cast<std::size_t>(0.94 * last));
+  const double high = nth_value(std::move(disparities), static_cast<std::size_t>(0.94 * last));
   const double least = low - 0.5 * alike_px(low), most = high + 0.5 * alike_px(high);
   const Box box = candidate.group.box.padded(candidate.is_new() ? kNewPad_px : kKnownPad_px, size);
   BoxValues near(box.area(), kNoValue);  // disparities as those of the group

@@ -20,8 +20,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view kMagic = "EgoSGM program 2";
-constexpr std::size_t kDigits = 32;  // of a file's name, before its end, which no file of others has
+constexpr std::string_view kMagic = "EgoSGM program 3";
+constexpr std::size_t kDigits = 16;  // of a file's name, before its end, which no file of others has
 constexpr std::string_view kEnd = ".egosgm";
 
 /// Platforms whose drivers keep what they compiled on the disk: a second copy would bring nothing.
@@ -114,7 +114,7 @@ bool is_ours(const std::string& name) {
 
 /// The header of a binary: its key, and how to tell that it is whole.
 std::string header(std::string_view key, std::string_view binary) {
-  return std::string(kMagic) + std::string(key) + digest_of(binary);
+  return std::string(kMagic) + std::string(key) + hash_of(binary);
 }
 
 std::string binary_of(const cl::Program& program) {
@@ -123,17 +123,6 @@ std::string binary_of(const cl::Program& program) {
 }
 
 }  // namespace
-
-std::string digest_of(std::string_view bytes) {
-  __extension__ using Wide = unsigned __int128;
-  const auto wide = [](std::uint64_t high, std::uint64_t low) { return Wide{high} << 64 | low; };
-  const Wide prime = wide(std::uint64_t{1} << 24, 0x13b);
-  Wide hash = wide(0x6c62272e07bb0142, 0x62b821756295c58d);
-  for (const char byte : bytes) hash = (hash ^ static_cast<unsigned char>(byte)) * prime;
-  std::string digits;
-  for (int shift = 124; shift >= 0; shift -= 4) digits += "0123456789abcdef"[static_cast<int>(hash >> shift) & 15];
-  return digits;
-}
 
 std::optional<ProgramCache> ProgramCache::of(const cl::Device& device, const std::string& wanted) {
   const auto variable = [](const char* name) {
@@ -155,7 +144,7 @@ ProgramCache::ProgramCache(fs::path folder, const cl::Device& device, std::uintm
     : folder_(std::move(folder)), identity_(identity_of(device)), max_bytes_(max_bytes) {}
 
 fs::path ProgramCache::file_of(const ProgramSource& source) const {
-  return folder_ / digest_of(identity_ + part(source.options) + part(source.text)).append(kEnd);
+  return folder_ / hash_of(identity_ + part(source.options) + part(source.text)).append(kEnd);
 }
 
 cl::Program ProgramCache::built(const cl::Context& context, const cl::Device& device,

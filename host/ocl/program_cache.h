@@ -5,15 +5,10 @@
 #include <filesystem>
 #include <optional>
 #include <string>
-#include <string_view>
 
 #include "host/ocl/program_folder.h"
 
 namespace egosgm::ocl {
-
-/// 32 hexadecimal digits (FNV-1a) that tell texts apart and damage, but no forgery: the cache takes files of this user
-/// and of root alone.
-std::string digest_of(std::string_view bytes);
 
 /// Built programs in a folder, for drivers that keep none themselves. Nothing that is wrong with the folder or with one
 /// of its files is an error: what cannot be taken from there is built. Constant, so thread-safe; processes may share

@@ -8,7 +8,6 @@
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
-#include <string_view>
 
 #include "egosgm/error.h"
 #include "host/json_text.h"
@@ -23,15 +22,6 @@ constexpr const char* kManifest = "manifest.json";
 constexpr int kFormat = 1;
 constexpr const char* kRemedy =
     "; compile them again: egosgm compile --device NAME --out DIR, with the options of the run";
-
-/// FNV-1a, 64 bits: tells versions of a text apart, and whole files from broken ones. No protection from intent.
-std::string hash_of(std::string_view bytes) {
-  std::uint64_t hash = 14695981039346656037u;
-  for (const unsigned char byte : bytes) hash = (hash ^ byte) * 1099511628211u;
-  char text[17];
-  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(hash));
-  return text;
-}
 
 /// The properties of a device that binaries depend on.
 std::vector<std::pair<std::string, std::string>> identity(const cl::Device& device) {
@@ -117,6 +107,14 @@ std::vector<unsigned char> binary_of(const cl::Program& program) {
 }
 
 }  // namespace
+
+std::string hash_of(std::string_view bytes) {
+  std::uint64_t hash = 14695981039346656037u;
+  for (const unsigned char byte : bytes) hash = (hash ^ byte) * 1099511628211u;
+  char text[17];
+  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(hash));
+  return text;
+}
 
 ProgramFolder::ProgramFolder(const std::filesystem::path& folder, const cl::Device& device) : folder_(folder) {
   const std::filesystem::path file = folder / kManifest;

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <map>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -17,6 +18,10 @@ struct ProgramSource {
   std::string kernel_file, text, options;
   std::string device_options;  // those of `options` that are no defines
 };
+
+/// 16 hexadecimal digits (FNV-1a) that tell versions of a text apart, and whole files from broken ones. No protection
+/// from intent.
+std::string hash_of(std::string_view bytes);
 
 /// The source without the parts that only some devices of a type get.
 ProgramText portable(const ProgramSource& source);

@@ -2,8 +2,7 @@
 // Computes a code a pixel for matching: a bit for each comparison of two grey values in a window around it.
 // - Census transform (Zabih and Woodfill 1994): every pixel of the window, row by row, against the centre.
 // - Alike, in place of the census of 9x7 where it is asked for, of grey values of 16 bits: which pixels of the window
-// are
-//   about as bright as its centre, so that they may lie on its surface.
+//   are about as bright as its centre, so that they may lie on its surface.
 // - The grey value itself (8 bits), for sums of absolute differences.
 // Pixels outside the image are those of its border.
 //

@@ -32,7 +32,7 @@ class ProgramCaches(ProgramTest):
         names = [file.name for file in cache.iterdir()]
         self.assertTrue(names)
         for name in names:
-            self.assertRegex(name, "^[0-9a-f]{32}[.]egosgm$")  # nothing that is half written stays
+            self.assertRegex(name, "^[0-9a-f]{16}[.]egosgm$")  # nothing that is half written stays
 
     def test_an_option_goes_before_the_variable(self):
         named, option, out = self.new_folder(), self.new_folder(), self.new_folder()
