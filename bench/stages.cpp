@@ -50,6 +50,7 @@ std::map<std::string, double> bytes_of(shared::ImageSize size, double cells) {
           {"StepPenalties", grey + 8 * pixels},
           {"BandedSgm", 2 * (2 * (codes + band) + maps + cells)},
           {"MedianFilter", 4 * maps},
+          {"RowInterpolation", 3 * maps},
           {"SpeckleRemoval", 2 * map},
           // Both views' codes, prediction and measurement, those of a quarter, and what is given out of the left view.
           {"Evidence", codes * 17 / 16 + 2 * maps + 2 * map},

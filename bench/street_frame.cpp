@@ -58,7 +58,7 @@ const FrameTimes& StreetFrame::full_range() {
   Belief nothing = belief_;
   nothing.forget(Unpredicted::kFirstFrame);
   run(after_, nothing);
-  full_range_cells_ = cells(/*right_row_step=*/1);
+  full_range_cells_ = cells(/*row_step=*/1);
   return times_;
 }
 
@@ -101,11 +101,10 @@ void StreetFrame::look(Step step) {
   last_ = now;
 }
 
-double StreetFrame::cells(int right_row_step) const {
+double StreetFrame::cells(int row_step) const {
   const std::vector<shared::RowSum> rows = method_.workspace().bands.row_sums.read(context_);
   double sum = 0;
-  for (int y = 0; y < size_.height; ++y) sum += rows[y].cells;
-  for (int y = 0; y < size_.height; y += right_row_step) sum += rows[size_.height + y].cells;
+  for (int y = 0; y < size_.height; y += row_step) sum += rows[y].cells + rows[size_.height + y].cells;
   return sum;
 }
 

@@ -38,7 +38,7 @@ class StreetFrame {
   const FrameTimes& full_range();
   /// Of the last frame that searched everything, and of the last steady one, both views.
   double full_range_cells() const { return full_range_cells_; }
-  double steady_cells() const { return cells(options_.banded_sgm.right_row_step); }
+  double steady_cells() const { return cells(options_.banded_sgm.row_step); }
 
   /// A checksum (FNV-1a) of what the last steady frame found in the left view.
   std::string bits() const;
@@ -46,7 +46,7 @@ class StreetFrame {
  private:
   const FrameTimes& run(Belief& after, const Belief& before);
   void look(Step step);
-  double cells(int right_row_step) const;
+  double cells(int row_step) const;
 
   ocl::Context& context_;
   const shared::ImageSize size_;

@@ -48,7 +48,7 @@ void for_each(Options& o, Visit&& visit) {
   visit("banded_sgm.p2", o.banded_sgm.p2);
   visit("banded_sgm.p2_at_edges", o.banded_sgm.p2_at_edges);
   visit("banded_sgm.p2_slope", o.banded_sgm.p2_slope);
-  visit("banded_sgm.right_row_step", o.banded_sgm.right_row_step);
+  visit("banded_sgm.row_step", o.banded_sgm.row_step);
   visit("banded_sgm.s_max", o.banded_sgm.s_max);
   visit("banded_sgm.variance_floor_px2", o.banded_sgm.variance_floor_px2);
   visit("banded_sgm.variance_per_step_px2", o.banded_sgm.variance_per_step_px2);
@@ -102,7 +102,7 @@ void choose_as_the_paper(MethodOptions& method) {
   method.consistency.update_px = std::numeric_limits<float>::infinity();  // left_right_px counts
   method.search_band.from_neighbours = false;
   method.banded_sgm.p2_slope = 0;
-  method.banded_sgm.right_row_step = 1;
+  method.banded_sgm.row_step = 1;
   // r = n_l + n_r.
   method.banded_sgm.s_max = 10;
   method.banded_sgm.variance_floor_px2 = 1e-6f;
@@ -163,8 +163,8 @@ void MethodOptions::validate() const {
          "choose 0 (the same penalty everywhere) to 255");
   expect("banded_sgm.p1", banded_sgm.p1, banded_sgm.p1 >= 0 && banded_sgm.p1 <= banded_sgm.p2,
          "choose 0 to banded_sgm.p2");
-  expect("banded_sgm.right_row_step", banded_sgm.right_row_step,
-         banded_sgm.right_row_step == 1 || banded_sgm.right_row_step == 2, "choose 1 or 2");
+  expect("banded_sgm.row_step", banded_sgm.row_step, banded_sgm.row_step == 1 || banded_sgm.row_step == 2,
+         "choose 1 or 2");
   expect("banded_sgm.s_max", banded_sgm.s_max, banded_sgm.s_max >= 1 && banded_sgm.s_max <= 32767, "choose 1 to 32767");
   expect("banded_sgm.max_memory_mib", banded_sgm.max_memory_mib, banded_sgm.max_memory_mib >= 0,
          "choose 0 (what the device has) or more");

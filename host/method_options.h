@@ -54,7 +54,8 @@ struct BandedSgmOptions {
   // below p2_at_edges (nor above p2).
   int p2 = 190;  // p1 <= p2 <= 190
   int p2_at_edges = 40, p2_slope = 6;
-  int right_row_step = 2;  // with evidence, frames with a prediction have every so many-th row of the right view
+  // With evidence, frames with a prediction match every so many-th row; of the right view they have no others.
+  int row_step = 2;
   // Matching variance r = floor + n (per_step + per_square n), n = n_l + n_r the steps to both sides until the (halved)
   // path sums above the minimum add up to s_max, at most 8 a side.
   int s_max = 80;

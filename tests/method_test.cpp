@@ -111,7 +111,7 @@ TEST(Method, AFrameLeavesTheBeliefBeforeItAsItWas) {
   frame(1, first, second);
   const auto of_second = [&] {  // the rows between those of the right view belong to nobody
     const HostMaps maps = masked({second.maps.disparity.read(built.context), second.maps.variance.read(built.context)});
-    return reference::without_absent_rows(kSize, options(32, 0).banded_sgm.right_row_step, maps);
+    return reference::without_absent_rows(kSize, {1, options(32, 0).banded_sgm.row_step}, maps);
   };
   const HostMaps once = of_second();
   EXPECT_EQ(first.maps.disparity.read(built.context), disparity);

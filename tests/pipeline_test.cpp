@@ -23,7 +23,7 @@ reference::Pipeline make_reference(const Setting& setting) {
 /// Of a map of `size` the rows of `views`.
 template <typename T>
 std::vector<T> of_views(const std::vector<T>& both, Views views, shared::ImageSize size) {
-  std::vector<T> present = both.empty() ? both : reference::without_absent_rows(size, views.right_row_step, both, T{});
+  std::vector<T> present = both.empty() ? both : reference::without_absent_rows(size, views.row_steps, both, T{});
   present.resize(both.size() / 2 * static_cast<std::size_t>(views.count));
   return present;
 }
@@ -56,17 +56,17 @@ void expect_same(const reference::Pass& actual, const reference::Pass& expected,
   EXPECT_TRUE(same(actual.band.row_sums, expected.band.row_sums, {1, size.height})) << "row sums";
   EXPECT_TRUE(same_bits(actual.codes, expected.codes, {(size.width + 2 * padding) * words, size.height})) << "codes";
   EXPECT_TRUE(same(actual.penalties, expected.penalties, {4 * size.width, size.height})) << "penalties";
-  const Views measured{2, views.right_row_step};
+  const Views measured{2, views.row_steps};
   expect_same("matched", actual.matched, expected.matched, size, measured);
   expect_same("smoothed", actual.smoothed, expected.smoothed, size, measured);
   ASSERT_FALSE(actual.measured.disparity.empty());
-  expect_same("measured", actual.measured, expected.measured, size, views);
+  expect_same("measured", actual.measured, expected.measured, size, {views.count, {1, views.row_steps.right}});
 }
 
 void expect_same(const reference::Frame& actual, const reference::Frame& expected, const Setting& setting) {
-  const Views tracked{expected.tracked_views, expected.right_row_step};
-  const Views matched = expected.predicted.disparity.empty() ? Views::kBoth : tracked;
-  const Views both{2, tracked.right_row_step};
+  const Views tracked{expected.tracked_views, expected.tracked_rows};
+  const Views matched{expected.predicted.disparity.empty() ? 2 : tracked.count, expected.matched_rows};
+  const Views both{2, tracked.row_steps};
   expect_same("warped", actual.warped, expected.warped, setting.size, tracked);
   expect_same("without_edges", actual.without_edges, expected.without_edges, setting.size, tracked);
   expect_same("filled", actual.filled, expected.filled, setting.size, tracked);
@@ -102,7 +102,9 @@ void expect_outputs(const OutputMemory& outputs, const reference::Frame& expecte
   const reference::Pass& pass = expected.passes.back();
   std::vector<std::uint16_t> widths;
   for (const shared::Band& band : half(pass.band.bands, 0)) {
-    widths.push_back(static_cast<std::uint16_t>(band.last - band.first + 1));
+    const std::size_t row = widths.size() / size.width;
+    const bool is_matched = row % expected.matched_rows.left == 0;
+    widths.push_back(static_cast<std::uint16_t>(is_matched ? band.last - band.first + 1 : 0));
   }
   const auto expect_map = [&](const char* name, const auto& map, const auto& values) {
     EXPECT_TRUE(same_bits(map.values(), values, size)) << "output " << name;
@@ -125,11 +127,11 @@ void expect_report(const FrameReport& report, const reference::Frame& expected, 
   double searched = 0;
   const bool has_prediction = !expected.predicted.disparity.empty();
   const int views = has_prediction && !setting.options.track_right ? 1 : 2;
-  const int right_row_step = expected.right_row_step;
   for (const reference::Pass& pass : expected.passes) {
     for (std::size_t i = 0; i < views * pixel_count(setting.size); ++i) {
-      const int row = static_cast<int>(i / setting.size.width), right_row = row - setting.size.height;
-      if (right_row < 0 || right_row % right_row_step == 0) searched += pass.band.bands[i].chunks * EGOSGM_LANES;
+      const int row = static_cast<int>(i / setting.size.width), height = setting.size.height;
+      if (row % height % shared::row_step_of(row / height, expected.matched_rows) == 0)
+        searched += pass.band.bands[i].chunks * EGOSGM_LANES;
     }
     const int coarse_chunks = SearchBand::max_chunks(CoarseMatch::coarse_range(range_of(setting.options)));
     searched += static_cast<double>(pass.coarse.size()) * coarse_chunks * EGOSGM_LANES;  // of both views
@@ -139,7 +141,9 @@ void expect_report(const FrameReport& report, const reference::Frame& expected, 
   EXPECT_NEAR(report.search_fraction, searched / cells, 1e-12);
   EXPECT_NEAR(report.density, valid_part(half(expected.output, 0)), 1e-12);
   EXPECT_EQ(static_cast<float>(report.vertical_offset_px), expected.vertical_offset_px);
-  const double predicted = !has_prediction ? 0 : valid_part(half(expected.predicted.disparity, 0));
+  const std::vector<float> of_matched_rows =
+      reference::present_rows(setting.size, EGOSGM_LEFT, expected.matched_rows.left, expected.predicted.disparity);
+  const double predicted = !has_prediction ? 0 : valid_part(of_matched_rows);
   EXPECT_NEAR(report.predicted_fraction, predicted, 1e-12);
 }
 

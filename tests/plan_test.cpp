@@ -10,8 +10,9 @@ namespace egosgm {
 namespace {
 
 std::string text_of(Views views) {
-  if (views == Views::kLeft) return "left";
-  return views.right_row_step == 1 ? "both" : "both, halved";  // the right rows
+  const std::string left = views.row_steps.left == 1 ? "left" : "left/2";
+  if (views.count == 1) return left;
+  return left + (views.row_steps.right == 1 ? " right" : " right/2");
 }
 
 /// What is decided, in a row.
@@ -41,27 +42,27 @@ constexpr Unpredicted kFirstFrame = Unpredicted::kFirstFrame, kReset = Unpredict
 
 // All that decides, in all combinations; what a frame without `temporal` has from before does not matter.
 constexpr Case kCases[] = {
-    {true, kBand, false, {}, true, "- | bands | tracks left | matches left x1 | coarse"},
-    {true, kBand, false, {}, false, "no motion | everything | tracks left | matches both x1"},
-    {true, kBand, false, kFirstFrame, true, "first frame | everything | tracks left | matches both x1"},
-    {true, kBand, false, kFirstFrame, false, "first frame | everything | tracks left | matches both x1"},
-    {true, kBand, false, kReset, true, "reset | everything | tracks left | matches both x1"},
-    {true, kBand, false, kReset, false, "reset | everything | tracks left | matches both x1"},
-    {true, kBand, true, {}, true, "- | bands | tracks both, halved | matches both, halved x1 | coarse"},
-    {true, kBand, true, {}, false, "no motion | everything | tracks both | matches both x1"},
-    {true, kBand, true, kFirstFrame, true, "first frame | everything | tracks both | matches both x1"},
-    {true, kBand, true, kFirstFrame, false, "first frame | everything | tracks both | matches both x1"},
-    {true, kBand, true, kReset, true, "reset | everything | tracks both | matches both x1"},
-    {true, kBand, true, kReset, false, "reset | everything | tracks both | matches both x1"},
+    {true, kBand, false, {}, true, "- | bands | tracks left | matches left/2 x1 | coarse"},
+    {true, kBand, false, {}, false, "no motion | everything | tracks left | matches left right x1"},
+    {true, kBand, false, kFirstFrame, true, "first frame | everything | tracks left | matches left right x1"},
+    {true, kBand, false, kFirstFrame, false, "first frame | everything | tracks left | matches left right x1"},
+    {true, kBand, false, kReset, true, "reset | everything | tracks left | matches left right x1"},
+    {true, kBand, false, kReset, false, "reset | everything | tracks left | matches left right x1"},
+    {true, kBand, true, {}, true, "- | bands | tracks left right/2 | matches left/2 right/2 x1 | coarse"},
+    {true, kBand, true, {}, false, "no motion | everything | tracks left right | matches left right x1"},
+    {true, kBand, true, kFirstFrame, true, "first frame | everything | tracks left right | matches left right x1"},
+    {true, kBand, true, kFirstFrame, false, "first frame | everything | tracks left right | matches left right x1"},
+    {true, kBand, true, kReset, true, "reset | everything | tracks left right | matches left right x1"},
+    {true, kBand, true, kReset, false, "reset | everything | tracks left right | matches left right x1"},
     {true, kFull, false, {}, true, "- | everything | tracks left | matches left x1"},
-    {true, kFull, false, {}, false, "no motion | everything | tracks left | matches both x1"},
-    {true, kFull, false, kFirstFrame, true, "first frame | everything | tracks left | matches both x1"},
-    {true, kFull, false, kReset, true, "reset | everything | tracks left | matches both x1"},
-    {true, kFull, true, {}, true, "- | everything | tracks both | matches both x1"},
-    {true, kFull, true, {}, false, "no motion | everything | tracks both | matches both x1"},
-    {false, kBand, false, {}, true, "not temporal | everything | tracks left | matches both x1"},
-    {false, kBand, true, kFirstFrame, false, "not temporal | everything | tracks both | matches both x1"},
-    {false, kFull, false, kReset, true, "not temporal | everything | tracks left | matches both x1"},
+    {true, kFull, false, {}, false, "no motion | everything | tracks left | matches left right x1"},
+    {true, kFull, false, kFirstFrame, true, "first frame | everything | tracks left | matches left right x1"},
+    {true, kFull, false, kReset, true, "reset | everything | tracks left | matches left right x1"},
+    {true, kFull, true, {}, true, "- | everything | tracks left right | matches left right x1"},
+    {true, kFull, true, {}, false, "no motion | everything | tracks left right | matches left right x1"},
+    {false, kBand, false, {}, true, "not temporal | everything | tracks left | matches left right x1"},
+    {false, kBand, true, kFirstFrame, false, "not temporal | everything | tracks left right | matches left right x1"},
+    {false, kFull, false, kReset, true, "not temporal | everything | tracks left | matches left right x1"},
 };
 
 TEST(Plan, DecidesEveryCase) {
@@ -103,7 +104,7 @@ TEST(Plan, MatchesTwiceWhereTheFirstMatchGivesTheVerticalOffset) {
 TEST(Plan, HasACoarseMatchOnlyWhereItIsOn) {
   MethodOptions options;
   options.coarse_match.enabled = false;
-  EXPECT_EQ(row(options, {}, true, true), "- | bands | tracks both, halved | matches both, halved x1");
+  EXPECT_EQ(row(options, {}, true, true), "- | bands | tracks left right/2 | matches left/2 right/2 x1");
 }
 
 TEST(Plan, MakesOnlyWhatIsWanted) {

@@ -24,12 +24,12 @@ std::vector<StageTime> stage_times(const std::vector<ocl::Context::Finished>& fi
 }
 
 double matched_cells(const MatchedFrame& frame) {
-  const std::size_t views = frame.row_sums.size() / frame.size.height;
+  const int views = static_cast<int>(frame.row_sums.size()) / frame.size.height;
   std::uint64_t cells = frame.parts.coarse_cells;
-  for (std::size_t view = 0; view < views; ++view) {
+  for (int view = 0; view < views; ++view) {
     for (const Stripe& stripe : *frame.parts.stripes) {
-      const std::size_t first = view * frame.size.height + stripe.first_row;
-      const int step = view == EGOSGM_LEFT ? 1 : frame.parts.right_row_step;
+      const std::size_t first = static_cast<std::size_t>(view) * frame.size.height + stripe.first_row;
+      const int step = shared::row_step_of(view, frame.parts.row_steps);
       for (int row = 0; row < stripe.rows; row += step) cells += frame.row_sums[first + row].cells;
     }
   }
@@ -39,16 +39,19 @@ double matched_cells(const MatchedFrame& frame) {
 }  // namespace
 
 void report_matching(const MatchedFrame& frame, FrameReport& report) {
-  const double pixels = static_cast<double>(pixel_count(frame.size));
   const double cells = static_cast<double>(frame.row_sums.size()) * frame.size.width * frame.range.count;
-  std::uint64_t predicted_pixels = 0;
-  for (int y = 0; frame.has_prediction && y < frame.size.height; ++y) predicted_pixels += frame.row_sums[y].predicted;
   const std::uint32_t whole_row =
       static_cast<std::uint32_t>(frame.size.width * SearchBand::max_chunks(frame.range)) * EGOSGM_LANES;
-  report.searched_everything = std::all_of(frame.row_sums.begin(), frame.row_sums.end(),
-                                           [&](const shared::RowSum& row) { return row.cells == whole_row; });
+  std::uint64_t predicted_pixels = 0, pixels = 0;
+  report.searched_everything = true;
+  for (int y = 0; y < frame.size.height; y += frame.parts.row_steps.left) {
+    predicted_pixels += frame.row_sums[y].predicted;
+    pixels += static_cast<std::uint64_t>(frame.size.width);
+    report.searched_everything = report.searched_everything && frame.row_sums[y].cells == whole_row;
+  }
   report.search_fraction = matched_cells(frame) / cells;
-  report.predicted_fraction = static_cast<double>(predicted_pixels) / pixels;
+  report.predicted_fraction =
+      frame.has_prediction ? static_cast<double>(predicted_pixels) / static_cast<double>(pixels) : 0;
 }
 
 void report_stages(const std::vector<ocl::Context::Finished>& finished, FrameReport& report) {

@@ -145,6 +145,11 @@ void FrameTransfer::give(const OutputText& text, const MapView<float>& view) con
 void FrameTransfer::give(const OutputText& text, const MapView<std::uint16_t>& view) const {
   copy_rows(fetched<shared::Band>(text.output), view,
             [](const shared::Band& b) { return static_cast<std::uint16_t>(b.last - b.first + 1); });
+  for (int y = 0; y < view.height; ++y) {
+    if (y % parts_.row_steps.left == 0) continue;
+    auto* row = reinterpret_cast<std::uint16_t*>(reinterpret_cast<char*>(view.data) + y * view.stride_bytes);
+    std::fill_n(row, view.width, std::uint16_t{0});
+  }
 }
 
 void FrameTransfer::give(const OutputText& text, const MapView<std::uint8_t>& view) const {

@@ -27,10 +27,12 @@ Plan plan_of(const MethodOptions& options, std::optional<Unpredicted> why_no_bel
   plan.motion = plan.predicts() ? motion : std::nullopt;
   plan.search = searches_bands ? Search::kBands : Search::kEverything;
   plan.tracked = options.track_right ? Views::kBoth : Views::kLeft;
-  if (searches_bands && options.track_right && Evidence::is_of(options)) {
-    plan.tracked.right_row_step = options.banded_sgm.right_row_step;
-  }
   plan.matched = plan.predicts() ? plan.tracked : Views::kBoth;
+  if (searches_bands && Evidence::is_of(options)) {
+    const cl_int step = options.banded_sgm.row_step;
+    plan.matched.row_steps = {step, step};
+    if (options.track_right) plan.tracked.row_steps.right = step;
+  }
   plan.matches = options.vertical_alignment.enabled && !knows_offset ? 2 : 1;
   plan.has_coarse_match = searches_bands && options.coarse_match.enabled;
   plan.repeats = repeats;

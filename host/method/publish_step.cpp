@@ -36,12 +36,12 @@ void PublishStep::prepare(PixelType type, const Wanted& wanted) {
 }
 
 void PublishStep::complete_right(const Plan& plan, StereoMaps& belief, StereoMaps& measured, Map& result) {
-  const int step = plan.tracked.right_row_step;
-  if (step == 1 || !plan.wanted.has_right()) return;
-  row_interpolation_.interpolate(step, result, belief.variance);
+  if (!plan.wanted.has_right()) return;
+  const shared::RowSteps steps = plan.tracked.row_steps;
+  row_interpolation_.interpolate(EGOSGM_RIGHT, steps, result, belief.variance);
   if (!plan.wanted.has(Output::kRightVariance)) return;
-  row_interpolation_.interpolate(step, belief.disparity, belief.variance);
-  row_interpolation_.interpolate(step, measured.disparity, measured.variance);
+  row_interpolation_.interpolate(EGOSGM_RIGHT, steps, belief.disparity, belief.variance);
+  row_interpolation_.interpolate(EGOSGM_RIGHT, steps, measured.disparity, measured.variance);
 }
 
 void PublishStep::write(const Plan& plan, const Reasons::Inputs& inputs, const Belief& before, Belief& after,

@@ -157,7 +157,7 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
                   .variance_per_step = options.variance_per_step_px2,
                   .variance_per_square = options.variance_per_square_px2,
                   .reads_off = 0,
-                  .right_row_step = 1,
+                  .row_steps = {1, 1},
                   .first_view = 0},
       launches_(launches),
       no_ranks_(context, 1) {
@@ -181,8 +181,8 @@ void BandedSgm::match(const MatchInputs& image, StereoMaps& measured, Views view
   match_stripes(image, measured, views, /*reads_off=*/false);
 }
 
-void BandedSgm::reading_off(const MatchInputs& image, StereoMaps& measured) {
-  match_stripes(image, measured, Views::kLeft, /*reads_off=*/true);
+void BandedSgm::reading_off(const MatchInputs& image, StereoMaps& measured, Views left) {
+  match_stripes(image, measured, left, /*reads_off=*/true);
 }
 
 void BandedSgm::match_stripes(const MatchInputs& image, StereoMaps& measured, Views views, bool reads_off) {
@@ -198,7 +198,7 @@ void BandedSgm::match_stripes(const MatchInputs& image, StereoMaps& measured, Vi
 void BandedSgm::match(const MatchInputs& inputs, StereoMaps& measured, Views views, bool reads_off) {
   shared::SgmParameters parameters = parameters_;
   parameters.reads_off = reads_off;
-  parameters.right_row_step = views.right_row_step;
+  parameters.row_steps = views.row_steps;
   if (reads_off) read_off_->clear();
   if (paths_) {
     paths_->match(parameters, inputs, measured, ranks(), views);

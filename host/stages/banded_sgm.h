@@ -58,7 +58,7 @@ class BandedSgm {
   void match(const MatchInputs& image, StereoMaps& measured, Views views);
   /// Matches the left view, and reads the right one's disparities off its sums: half of the work, whole disparities.
   /// REQUIRES: that was prepared.
-  void reading_off(const MatchInputs& image, StereoMaps& measured);
+  void reading_off(const MatchInputs& image, StereoMaps& measured, Views left = Views::kLeft);
   /// Builds and allocates what that needs.
   void prepare_reading_off();
 

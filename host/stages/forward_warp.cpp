@@ -104,7 +104,7 @@ void ForwardWarp::warp(const StereoMaps& belief, const FlagMap& evidence, const 
   motion.covariance *= static_cast<double>(options_.motion_noise);
   const shared::DisparityMotion left = disparity_motion(calibration_, motion, EGOSGM_LEFT);
   shared::DisparityMotion right = disparity_motion(calibration_, motion, EGOSGM_RIGHT);
-  right.row_step = views.right_row_step;
+  right.row_step = views.row_steps.right;
   if (bands_) {
     auto& [find_spans, splat_bands, spans] = *bands_;
     const int bands = (size.height + band_rows_ - 1) / band_rows_;

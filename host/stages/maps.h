@@ -89,15 +89,16 @@ struct Prediction {
         hidden(context, 2 * pixel_count(size)) {}
 };
 
-/// The views that a stage works on, and of the right one every so many-th row, from its first on. The rows between are
-/// neither read nor written.
+/// The views that a stage works on, and which of their rows.
 struct Views {
   int count = 2;
-  cl_int right_row_step = 1;
+  shared::RowSteps row_steps{1, 1};
 
   static const Views kLeft, kBoth;
-  friend bool operator==(const Views&, const Views&) = default;
+  friend bool operator==(const Views& a, const Views& b) {
+    return a.count == b.count && a.row_steps.left == b.row_steps.left && a.row_steps.right == b.row_steps.right;
+  }
 };
-inline constexpr Views Views::kLeft{1, 1}, Views::kBoth{2, 1};
+inline constexpr Views Views::kLeft{1, {1, 1}}, Views::kBoth{2, {1, 1}};
 
 }  // namespace egosgm

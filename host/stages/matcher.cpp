@@ -22,8 +22,8 @@ void Matcher::match(const FrameImages& images, const SearchBands& bands, StereoM
   banded_sgm_.match(inputs(images, bands, views), matched, views);
 }
 
-void Matcher::reading_off(const FrameImages& images, const SearchBands& bands, StereoMaps& matched) {
-  banded_sgm_.reading_off(inputs(images, bands, Views::kLeft), matched);
+void Matcher::reading_off(const FrameImages& images, const SearchBands& bands, StereoMaps& matched, Views views) {
+  banded_sgm_.reading_off(inputs(images, bands, views), matched, views);
 }
 
 MatchInputs Matcher::inputs(const FrameImages& images, const SearchBands& bands, Views views) {

@@ -27,7 +27,7 @@ class Matcher {
 
   /// See BandedSgm. REQUIRES: the images' type was prepared.
   void match(const FrameImages& images, const SearchBands& bands, StereoMaps& matched, Views views);
-  void reading_off(const FrameImages& images, const SearchBands& bands, StereoMaps& matched);
+  void reading_off(const FrameImages& images, const SearchBands& bands, StereoMaps& matched, Views views);
 
   const BandedSgm& banded_sgm() const { return banded_sgm_; }
   const ocl::Buffer<cl_uint>& codes() const { return codes_; }

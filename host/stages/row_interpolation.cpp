@@ -7,8 +7,9 @@ RowInterpolation::RowInterpolation(ocl::Context& context, shared::ImageSize size
     : stage_(context, "RowInterpolation", "row_interpolation.cl", size, pixels),
       interpolate_(stage_, "interpolate_rows") {}
 
-void RowInterpolation::interpolate(int right_row_step, Map& disparity, Map& variance) {
-  stage_.launch_pixels(interpolate_, /*views=*/1, right_row_step, disparity, variance);
+void RowInterpolation::interpolate(cl_int view, shared::RowSteps steps, Map& disparity, Map& variance) {
+  const cl_int step = view == EGOSGM_LEFT ? steps.left : steps.right;
+  if (step > 1) stage_.launch_pixels(interpolate_, /*views=*/1, view, step, disparity, variance);
 }
 
 }  // namespace egosgm

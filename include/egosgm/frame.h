@@ -18,7 +18,7 @@ namespace egosgm {
 struct DebugMaps {
   MapView<float> predicted, predicted_variance;  // before matching
   MapView<float> measured, measured_variance;    // after matching and its checks
-  MapView<std::uint16_t> search_width;           // disparities that can win at each pixel
+  MapView<std::uint16_t> search_width;  // disparities that can win at each pixel; 0 in rows that are not matched
   // 255 where something moves by itself: the last image and the last map, moved by the camera's motion, contradict the
   // new ones. Else 0, also where that cannot be asked: everywhere without a prediction, or where the frame before was
   // not asked for this map.
@@ -66,7 +66,7 @@ struct FrameReport {
   bool repeated = false;                   // images of the frame before: the motion counts for the next one
   bool searched_everything = false;        // the whole range at every pixel: without a prediction, or not trusting it
   double search_fraction = 0;              // see above
-  double predicted_fraction = 0;           // left pixels with a prediction
+  double predicted_fraction = 0;           // left pixels with a prediction, of rows that are matched
   double density = 0;                      // left pixels with a disparity
   double vertical_offset_px = 0;           // by which the middle of the right image was resampled
   int launches = 0;                        // kernels enqueued

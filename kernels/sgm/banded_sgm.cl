@@ -26,7 +26,6 @@
 //   one or two chunks     any                                     narrow.h    a path
 //   a block of vectors    any                                     one_block.h a path
 //   more                  any                                     wide.h      a block of a path, in two passes
-//
 // banded_sgm_paths.cl has one form for all bands, path_together.h.
 //
 // If the right view comes from the left view's sums, the sweep that finds the winners leaves at each right pixel the
@@ -84,9 +83,9 @@ ALWAYS_INLINE void match_wide(const bool meets, const SgmParameters q, const Row
     pixel.wiped_at[n] = row->slot[n] + (start + (uint)origin_of(place->wiped[n]));
     pixel.is_wiped[n] = !covers(extent, place->wiped[n]);
     pixel.wiped[n] = place->wiped[n];
+    pixel.p1[n] = n > 0 ? row->p1_across_rows.s0 : row->p1.s0;
     pixel.p2[n] = (uchar)(steps >> 8 * n);
   }
-  pixel.p1 = (uchar)q.p1;
   pixel.own = place->own;
   pixel.other = place->other + origin;
   pixel.row_above = row->row_above;
@@ -176,6 +175,7 @@ ALWAYS_INLINE Row row_at(const bool meets, const bool backward, const SgmParamet
   row.step = step;
   row.code_step = q.first_view + sweep->view == EGOSGM_LEFT ? step : -step;
   row.p1 = (uchar16)((uchar)q.p1);
+  row.p1_across_rows = (uchar16)((uchar)p1_across_rows(q.p1, sweep->row_step));
   return row;
 }
 
@@ -311,7 +311,7 @@ ALWAYS_INLINE void sweep_view(const bool meets, const bool backward, const SgmPa
   sweep.disparities += not_matched;
   sweep.variances += not_matched;
   sweep.row_sums += (size_t)q.first_view * q.height;
-  sweep.row_step = row_step_of(q.first_view + sweep.view, q.right_row_step);
+  sweep.row_step = row_step_of(q.first_view + sweep.view, q.row_steps);
   sweep.rows = rows_of(q, q.first_view + sweep.view);
   sweep.slots += (size_t)(2 * sweep.view + backward) * SLOTS_OF(q) * SLOT + SLOT_PADDING;
   if (backward) {

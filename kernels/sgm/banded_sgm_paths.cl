@@ -146,7 +146,7 @@ KERNEL __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void find_winn
     global const uchar* backward_second, global float* disparities, global float* variances, global uint* ranks) {
   local uint minima[LINES][MINIMA];
   const int lane = get_local_id(0) % LANES, line = get_local_id(0) / LANES;
-  const int view = get_group_id(2), y = (int)get_group_id(1) * row_step_of(view, q.right_row_step);
+  const int view = get_group_id(2), y = (int)get_group_id(1) * row_step_of(view, q.row_steps);
   if (y >= q.height) return;
   find_winner(q, get_group_id(0) * LINES + line, y, view, lane, minima[line], codes, bands, offsets, forward_first,
               forward_second, backward_first, backward_second, disparities, variances, ranks);

@@ -35,7 +35,7 @@ ALWAYS_INLINE void follow_narrow(const SgmParameters q, const Row* row, const ui
   }
 #pragma unroll
   for (int n = 1; n < DIRECTIONS; ++n) {
-    r[n] = path_cost_from(row->slot[n] + moved_lane, cost, row->p1, p2[n]);
+    r[n] = path_cost_from(row->slot[n] + moved_lane, cost, row->p1_across_rows, p2[n]);
     wipe(row->slot[n] + (place->moved + (uint)origin_of(place->wiped[n])), place->wiped[n]);
   }
   uchar16 least[DIRECTIONS];

@@ -13,7 +13,6 @@
 ALWAYS_INLINE void follow_block(const SgmParameters q, const Row* row, const uint extent, const uint steps,
                                 const Block absent, const Block cost, Place* place, Block* r) {
   const int origin = origin_of(extent);
-  const Block p1 = (Block)(row->p1.s0);
   uchar16 least[DIRECTIONS];
 #pragma unroll
   for (int n = 0; n < DIRECTIONS; ++n) {
@@ -25,6 +24,7 @@ ALWAYS_INLINE void follow_block(const SgmParameters q, const Row* row, const uin
     const Block above = beside ? LANES_ABOVE(place->last_block) : load_block(from + 1);
     const Block same = beside ? place->last_block : load_block(from);
     const Block before = beside ? place->least_of_block : (Block)(0);
+    const Block p1 = (Block)(n > 0 ? row->p1_across_rows.s0 : row->p1.s0);
     const Block p2 = saturated_sum(before, (Block)((uchar)(steps >> 8 * n)));
     r[n] = saturated_sum(cost, LEAST_WAY(same, below, above, p1, p2, least_of, saturated_sum) - before);
     least[n] = LEAST_OF_VECTORS(r[n]);

@@ -23,7 +23,7 @@ typedef struct {
   uint own, own_step;
   uint other, other_step;  // at the range's first disparity
   uint penalty_offset;     // from a pixel to that with P2 of the step to it: in a backward sweep the one it comes from
-  int direction;
+  int direction, p1;
 } Path;
 
 // The pixels' values in memory.
@@ -42,10 +42,10 @@ typedef struct {
   short4 band;
 } Stored;
 
-// A pixel on it: P2 of the step to it, which lanes of the range its band holds, [first, end), none (0, 0) beyond the
-// end of the path, and where the cell of the range's first lane would be.
+// A pixel on it: P1 and P2 of the step to it, which lanes of the range its band holds, [first, end), none (0, 0) beyond
+// the end of the path, and where the cell of the range's first lane would be.
 typedef struct {
-  int p2;
+  int p1, p2;
   int first, end;
   long cells;
 } Pixel;
@@ -68,7 +68,7 @@ static inline Line line_of(const int width, const int rows, const int direction,
 static inline Path path_of(const SgmParameters q, const int direction, const bool backward, const int view,
                            const Line line) {
   const int sign = backward ? -1 : 1, view_sign = view == EGOSGM_LEFT ? 1 : -1;
-  const int row_step = row_step_of(view, q.right_row_step);
+  const int row_step = row_step_of(view, q.row_steps);
   const int stride = q.width + 2 * q.padding;
   Path path;
   path.length = line.length;
@@ -85,6 +85,7 @@ static inline Path path_of(const SgmParameters q, const int direction, const boo
   path.other_step = path.y_step * stride - view_sign * path.x_step;
   path.penalty_offset = backward ? -path.pixel_step : 0;
   path.direction = direction;
+  path.p1 = direction == 0 ? q.p1 : p1_across_rows(q.p1, row_step);
   return path;
 }
 
@@ -114,7 +115,7 @@ static inline Pixel pixel_of(const SgmParameters q, const Path path, const int i
   const uint at = path.pixel + i * path.pixel_step;
   const uint row_start = at - (path.x + i * path.x_step);
   const int first = i < path.length ? stored.band.x - q.min_disparity : 0;
-  const Pixel pixel = {stored.p2, first, min(first + (ushort)stored.band.y * EGOSGM_LANES, q.disparities),
+  const Pixel pixel = {path.p1, stored.p2, first, min(first + (ushort)stored.band.y * EGOSGM_LANES, q.disparities),
                        (long)cells_of(row_start, at, stored.offset) - first_cell_of(first)};
   return pixel;
 }
@@ -124,9 +125,9 @@ static inline Pixel pixel_of(const SgmParameters q, const Path path, const int i
 // The costs of VECTOR disparities from `at` on: the matching costs and the least way from those of the pixel before
 // (`same`, `behind` by one disparity, `ahead`), from all of which `least`, their least, is still to be taken off.
 // Absent outside of the band.
-static inline Costs path_costs(const SgmParameters q, const Pixel pixel, const int at, const Costs matching,
-                               const Costs same, const Costs behind, const Costs ahead, const int least) {
-  const Costs way = LEAST_WAY(same, behind, ahead, (Costs)(q.p1), (Costs)(pixel.p2 + least), min, PLAIN_SUM);
+static inline Costs path_costs(const Pixel pixel, const int at, const Costs matching, const Costs same,
+                               const Costs behind, const Costs ahead, const int least) {
+  const Costs way = LEAST_WAY(same, behind, ahead, (Costs)(pixel.p1), (Costs)(pixel.p2 + least), min, PLAIN_SUM);
   const Costs costs = matching + way - (Costs)(least);
   return are_below((Costs)(at - pixel.first) + (Costs)(INDEX), pixel.end - pixel.first) ? costs : (Costs)(ABSENT);
 }

@@ -62,7 +62,7 @@ static inline Costs costs_of_vector(const SgmParameters q, const Pixel pixel, co
   if (holds(before, vector)) same = COSTS_OF(before.costs[vector]);
   if (holds(before, vector - 1)) below = kept[-1];
   if (holds(before, vector + 1)) above = kept[VECTOR];
-  return path_costs(q, pixel, VECTOR * vector, cost_of(matches.own, matches.others), same, BEHIND(below, same),
+  return path_costs(pixel, VECTOR * vector, cost_of(matches.own, matches.others), same, BEHIND(below, same),
                     AHEAD(same, above), before.least);
 }
 

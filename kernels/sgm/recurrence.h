@@ -9,4 +9,8 @@
 // and one above. `least`, `sum`: of two vectors; the sum saturates where costs have 8 bits.
 #define LEAST_WAY(same, below, above, p1, p2, least, sum) least(least(same, sum(least(below, above), p1)), p2)
 
+// P1 of a step from one matched row to the next, `row_step` further: there a slanted surface's disparity changes by so
+// many times as much.
+static inline int p1_across_rows(const int p1, const int row_step) { return p1 / row_step; }
+
 #endif

@@ -22,7 +22,7 @@ typedef struct {
   long above_right;           // to that pixel
   long end;
   int step, code_step;
-  uchar16 p1;
+  uchar16 p1, p1_across_rows;
 } Row;
 
 // The next pixel.

@@ -17,7 +17,7 @@
 
 // The number of rows of a view that are matched.
 static inline int rows_of(const SgmParameters q, const int view) {
-  const int step = row_step_of(view, q.right_row_step);
+  const int step = row_step_of(view, q.row_steps);
   return (q.height + step - 1) / step;
 }
 

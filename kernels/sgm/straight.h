@@ -78,10 +78,11 @@ static inline uchar16 in_lower_lanes(const ushort8 v) { return (uchar16)(as_ucha
 
 // The path costs of a pixel that goes straight, but for those from the left left in the slots in place of those before
 // it, and half of their sum.
-ALWAYS_INLINE uchar8 follow_chunk(const uchar8 chunk_cost, const uint steps, const uchar16 p1, const Places* to,
+ALWAYS_INLINE uchar8 follow_chunk(const uchar8 chunk_cost, const uint steps, const Row* row, const Places* to,
                                   const uint along, const Before before, FromLeft* left) {
   const uchar16 cost = (uchar16)(chunk_cost, chunk_cost);
   const uchar4 p2 = as_uchar4(steps);
+  const uchar16 p1 = (uchar16)(row->p1.lo, row->p1_across_rows.hi);
 #if PATHS == 8
   const uchar16 p2_of[PATH_PAIRS] = {p2.s0000000022222222, p2.s1111111133333333};
 #else
@@ -95,7 +96,7 @@ ALWAYS_INLINE uchar8 follow_chunk(const uchar8 chunk_cost, const uint steps, con
          (cost - left->least);
 #if PATHS == 8
   t[1] = add_sat(cost, LEAST_WAY(load_pair(to, 1, along, 0), load_pair(to, 1, along, -1), load_pair(to, 1, along, 1),
-                                 p1, p2_of[1], min, add_sat));
+                                 row->p1_across_rows, p2_of[1], min, add_sat));
 #endif
 #pragma unroll
   for (int n = 1; n < DIRECTIONS; ++n) store((uchar16)(ABSENT), to->wiped_at[n] + along);
@@ -186,7 +187,7 @@ ALWAYS_INLINE void match_straight(const bool meets, const bool backward, const S
       to.wiped_at[n] = row->slot[n] + (place->moved + (uint)origin_of(place->wiped[n]));
     if (backward) place->cells -= EGOSGM_LANES;
     const uchar8 cost = matching_cost_of_chunk(place->own, place->other + origin, row->row_above, row->row_below);
-    const uchar8 sum = follow_chunk(cost, steps, row->p1, &to, along, before, &left);
+    const uchar8 sum = follow_chunk(cost, steps, row, &to, along, before, &left);
     leave_chunk(meets, q, row, place, origin, cost, sum, &seen);
     go_on(row, place);
     place->wiped[0] = extent;

@@ -15,7 +15,7 @@ typedef struct {
   global uchar* wiped_at[DIRECTIONS];  // and that of its predecessor's
   uint wiped[DIRECTIONS];              // the predecessors' extents
   bool is_wiped[DIRECTIONS];           // whether its own costs do not overwrite theirs
-  uchar p1, p2[DIRECTIONS];
+  uchar p1[DIRECTIONS], p2[DIRECTIONS];
   global const Code *own, *other;  // its code, and that of its first disparity
   long row_above, row_below;       // to the codes of these rows
   int disparities;                 // of the range, from its first one on
@@ -37,7 +37,7 @@ static inline void follow_paths(const Pixel* pixel, const int b, const Block abs
 #pragma unroll
   for (int n = 0; n < DIRECTIONS; ++n) {
     global const uchar* from = pixel->at[n] + at;
-    const Block way = LEAST_WAY(load_block(from), load_block(from - 1), load_block(from + 1), (Block)(pixel->p1),
+    const Block way = LEAST_WAY(load_block(from), load_block(from - 1), load_block(from + 1), (Block)(pixel->p1[n]),
                                 (Block)(pixel->p2[n]), least_of, saturated_sum);
     const Block t = saturated_sum(cost, way);
     costs->t[n][b] = t;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Left-right consistency: the left pixel x sees what the right pixel x - d sees, the right pixel x what the left pixel
-// x + d sees. Where the right view lacks a row, the left one asks those above and below it: one that agrees is enough.
+// x + d sees. Where that view lacks a row, those above and below it are asked: one that agrees is enough.
 #include "pixels.h"
 
 // lint: PIXELS=1
@@ -10,15 +10,15 @@ static inline Ints agrees(const Floats d, const Floats other, const float max_di
   return is_valid(other) & (fabs(other - d) <= max_difference);
 }
 
-COMPILED_ONCE void check_row(const WorkItem at, const ImageSize size, const int right_row_step,
+COMPILED_ONCE void check_row(const WorkItem at, const ImageSize size, const RowSteps row_steps,
                              const float max_difference, const int keep_outside, global const float* disparity,
                              global float* kept) {
-  if (!has_row(at, right_row_step)) return;
+  if (!has_row(at, row_steps)) return;
   const int y = at.y;
   const int view = at.view;
   const int width = size.width;
   const size_t row = ((size_t)view * size.height + y) * width;
-  const int above = y - y % right_row_step, next = above + right_row_step;
+  const int step = row_step_of(1 - view, row_steps), above = y - y % step, next = above + step;
   const int below = above < y && next < size.height ? next : above;
   const size_t other_view = (size_t)(1 - view) * size.height * width;
   global const float* other_above = disparity + other_view + (size_t)above * width;
@@ -45,7 +45,7 @@ COMPILED_ONCE void check_row(const WorkItem at, const ImageSize size, const int 
   }
 }
 
-KERNEL void check(const ImageSize size, const int right_row_step, const float max_difference, const int keep_outside,
+KERNEL void check(const ImageSize size, const RowSteps row_steps, const float max_difference, const int keep_outside,
                   global const float* disparity, global float* kept) {
-  check_row(THIS_WORK_ITEM, size, right_row_step, max_difference, keep_outside, disparity, kept);
+  check_row(THIS_WORK_ITEM, size, row_steps, max_difference, keep_outside, disparity, kept);
 }

@@ -12,10 +12,10 @@ static inline Ints is_jump(const Floats d, const Floats near, const Floats far, 
   return (neighbour > INVALID) & (fabs(neighbour - d) > max_jump);
 }
 
-COMPILED_ONCE void reject_row(const WorkItem at, const ImageSize size, const int right_row_step, const float max_jump,
+COMPILED_ONCE void reject_row(const WorkItem at, const ImageSize size, const RowSteps row_steps, const float max_jump,
                               global const float* disparity, global float* kept) {
-  if (!has_row(at, right_row_step)) return;
-  const int y = at.y, step = row_step_of(at.view, right_row_step);
+  if (!has_row(at, row_steps)) return;
+  const int y = at.y, step = row_step_of(at.view, row_steps);
   const int width = size.width, stride = step * width;
   const size_t row = ((size_t)at.view * size.height + y) * width;
   global const float* here = disparity + row;
@@ -36,7 +36,7 @@ COMPILED_ONCE void reject_row(const WorkItem at, const ImageSize size, const int
   }
 }
 
-KERNEL void reject(const ImageSize size, const int right_row_step, const float max_jump, global const float* disparity,
+KERNEL void reject(const ImageSize size, const RowSteps row_steps, const float max_jump, global const float* disparity,
                    global float* kept) {
-  reject_row(THIS_WORK_ITEM, size, right_row_step, max_jump, disparity, kept);
+  reject_row(THIS_WORK_ITEM, size, row_steps, max_jump, disparity, kept);
 }

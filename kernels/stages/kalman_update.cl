@@ -182,8 +182,8 @@ COMPILED_ONCE void update_row(const WorkItem at, const KalmanParameters q, globa
                               global const uchar* evidence_before, global const int* block_evidence,
                               global const float* found, global const float* drifts, global float* updated,
                               global float* updated_variance, global uchar* updated_doubtful, global uchar* evidence) {
-  if (!has_row(at, q.right_row_step)) return;
-  const int step = row_step_of(at.view, q.right_row_step);
+  if (!has_row(at, q.row_steps)) return;
+  const int step = row_step_of(at.view, q.row_steps);
   const ImageSize size = {q.width, q.height};
   const int width = q.width;
   const int y = at.y;

@@ -81,10 +81,10 @@ AT_EDGE void filter_block_at_edge(const int x, const bool fills, const int has_a
   filter_block(x, width, fills, has_above, has_below, stride, here, filtered, variance);
 }
 
-COMPILED_ONCE void filter_row(const WorkItem at, const bool fills, const ImageSize size, const int right_row_step,
+COMPILED_ONCE void filter_row(const WorkItem at, const bool fills, const ImageSize size, const RowSteps row_steps,
                               global const float* disparity, global float* filtered, global float* variance) {
-  if (!has_row(at, right_row_step)) return;
-  const int step = row_step_of(at.view, right_row_step), stride = step * size.width;
+  if (!has_row(at, row_steps)) return;
+  const int step = row_step_of(at.view, row_steps), stride = step * size.width;
   const int width = size.width, has_above = at.y >= step, has_below = at.y + step < size.height;
   const size_t row = ((size_t)at.view * size.height + at.y) * width;
   FOR_PIXELS(x, width) {
@@ -97,12 +97,12 @@ COMPILED_ONCE void filter_row(const WorkItem at, const bool fills, const ImageSi
   }
 }
 
-KERNEL void filter(const ImageSize size, const int right_row_step, global const float* disparity,
+KERNEL void filter(const ImageSize size, const RowSteps row_steps, global const float* disparity,
                    global float* filtered) {
-  filter_row(THIS_WORK_ITEM, false, size, right_row_step, disparity, filtered, 0);
+  filter_row(THIS_WORK_ITEM, false, size, row_steps, disparity, filtered, 0);
 }
 
-KERNEL void filter_and_fill(const ImageSize size, const int right_row_step, global const float* disparity,
+KERNEL void filter_and_fill(const ImageSize size, const RowSteps row_steps, global const float* disparity,
                             global float* filtered, global float* variance) {
-  filter_row(THIS_WORK_ITEM, true, size, right_row_step, disparity, filtered, variance);
+  filter_row(THIS_WORK_ITEM, true, size, row_steps, disparity, filtered, variance);
 }

@@ -20,13 +20,13 @@
 #define GATHERED_AT_ONCE (PIXELS == 1 ? 1 : 8)
 
 // Predictions count for the rows that the view lacks, too. A work-item BLOCKS blocks and view, or a row of them.
-KERNEL void gather_blocks(const ImageSize size, const int right_row_step, global const float* disparity,
+KERNEL void gather_blocks(const ImageSize size, const RowSteps row_steps, global const float* disparity,
                           global BlockRange* ranges) {
   const WorkItem at = THIS_WORK_ITEM;
   const ImageSize blocks = blocks_of(size);
   const int y = at.y;
   const int view = at.view;
-  const int end = min((y + 1) * EGOSGM_BLOCK, size.height), step = row_step_of(view, right_row_step);
+  const int end = min((y + 1) * EGOSGM_BLOCK, size.height), step = row_step_of(view, row_steps);
   for (int x = at.x * BLOCKS * GATHERED_AT_ONCE; x < blocks.width; x += at.items * BLOCKS * GATHERED_AT_ONCE) {
     Spans spans[GATHERED_AT_ONCE];
 #pragma unroll
@@ -229,7 +229,7 @@ COMPILED_ONCE void sum_row(const WorkItem at, const ImageSize size, global const
 #endif
 
 // Work-items that have a row alone sum it up, too. A work-item PIXELS pixels and view, or a row and view.
-COMPILED_ONCE void bands_of_pixels_row(const WorkItem at, const ImageSize size, const int right_row_step,
+COMPILED_ONCE void bands_of_pixels_row(const WorkItem at, const ImageSize size, const RowSteps row_steps,
                                        const DisparityRange range, const float sigmas, const float min_half_width,
                                        global const float* disparity, global const float* variance,
                                        const float coarse_tolerance, const float coarse_margin,
@@ -237,7 +237,7 @@ COMPILED_ONCE void bands_of_pixels_row(const WorkItem at, const ImageSize size, 
                                        global Band* bands, global uint* cell_offsets, global RowSum* row_sums) {
   const ImageSize blocks = blocks_of(size);
   const int y = at.y, view = at.view, width = size.width;
-  if (!has_row(at, right_row_step)) return;
+  if (!has_row(at, row_steps)) return;
   const size_t row = ((size_t)view * size.height + y) * width;
   const size_t row_of_blocks = index_of(blocks, view, 0, y / EGOSGM_BLOCK);
   FOR_CHUNKS(start, width) {
@@ -267,22 +267,22 @@ COMPILED_ONCE void bands_of_pixels_row(const WorkItem at, const ImageSize size, 
 #endif
 }
 
-KERNEL void bands_of_pixels(const ImageSize size, const int right_row_step, const DisparityRange range,
+KERNEL void bands_of_pixels(const ImageSize size, const RowSteps row_steps, const DisparityRange range,
                             const float sigmas, const float min_half_width, global const float* disparity,
                             global const float* variance, const float coarse_tolerance, const float coarse_margin,
                             global const BlockRange* found, global const Band* block_bands, global Band* bands,
                             global uint* cell_offsets, global RowSum* row_sums) {
-  bands_of_pixels_row(THIS_WORK_ITEM, size, right_row_step, range, sigmas, min_half_width, disparity, variance,
+  bands_of_pixels_row(THIS_WORK_ITEM, size, row_steps, range, sigmas, min_half_width, disparity, variance,
                       coarse_tolerance, coarse_margin, found, block_bands, bands, cell_offsets, row_sums);
 }
 
 #if ROW_GROUP == 1
 
 // Counts rows that were not banded pixel by pixel. A work-item a row and view.
-KERNEL void sum_rows(const ImageSize size, const int right_row_step, global const float* disparity,
+KERNEL void sum_rows(const ImageSize size, const RowSteps row_steps, global const float* disparity,
                      global const Band* bands, global uint* cell_offsets, global RowSum* row_sums) {
   const WorkItem at = THIS_WORK_ITEM;
-  if (has_row(at, right_row_step)) sum_row(at, size, disparity, bands, cell_offsets, row_sums);
+  if (has_row(at, row_steps)) sum_row(at, size, disparity, bands, cell_offsets, row_sums);
 }
 
 #else
@@ -290,13 +290,13 @@ KERNEL void sum_rows(const ImageSize size, const int right_row_step, global cons
 // Sums up each row: a work-group of ROW_GROUP a row and view goes over it in tiles, with an inclusive scan of a tile at
 // a time.
 KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(
-    const ImageSize size, const int right_row_step, global const float* disparity, global const Band* bands,
+    const ImageSize size, const RowSteps row_steps, global const float* disparity, global const Band* bands,
     global uint* cell_offsets, global RowSum* row_sums) {
   const int lane = get_local_id(0);
   const int y = get_global_id(1);
   const int view = get_global_id(2);
   const size_t row = (size_t)view * size.height + y;
-  const int width = has_row(THIS_WORK_ITEM, right_row_step) ? size.width : 0;
+  const int width = has_row(THIS_WORK_ITEM, row_steps) ? size.width : 0;
   uint chunks_before = 0;
   uint predicted = 0;
   local uint chunks[ROW_GROUP];

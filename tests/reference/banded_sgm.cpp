@@ -49,12 +49,12 @@ struct View {
     return codes[static_cast<std::size_t>(std::clamp(y, 0, q.height - 1)) * q.width + std::clamp(x, 0, q.width - 1)];
   }
   /// Every so many-th row is matched.
-  int row_step() const { return view == EGOSGM_LEFT ? 1 : q.right_row_step; }
+  int row_step() const { return shared::row_step_of(view, q.row_steps); }
   int rows() const { return (q.height + row_step() - 1) / row_step(); }
   /// P2 of the step from the pixel before, (dx, dy rows) back: that of the lower one of the two from its neighbour.
   int p2(int x, int y, int dx, int dy) const {
     const int lower_x = dy < 0 ? x - dx : x, lower_y = dy < 0 ? y + row_step() : y;
-    const int upper_x = dy < 0 ? x : x - dx, upper_y = dy == 0 ? y : lower_y - 1;
+    const int upper_x = dy < 0 ? x : x - dx, upper_y = dy == 0 ? y : lower_y - row_step();
     return step_penalty(options, grey[lower_y * q.width + lower_x], grey[upper_y * q.width + upper_x]);
   }
   int matched(int x, int d) const { return view == EGOSGM_LEFT ? x - d : x + d; }
@@ -78,6 +78,7 @@ struct View {
 /// L of one path, relative to its minimum at every pixel.
 void aggregate(const View& v, int dx, int dy, Cells& costs) {
   const shared::SgmParameters& q = v.q;
+  const int p1 = dy == 0 ? q.p1 : q.p1 / v.row_step();
   for (int i = 0; i < v.rows(); ++i) {
     for (int j = 0; j < q.width; ++j) {
       const int row = dy >= 0 ? i : v.rows() - 1 - i, x = dx >= 0 ? j : q.width - 1 - j;
@@ -89,8 +90,8 @@ void aggregate(const View& v, int dx, int dy, Cells& costs) {
       for (int d = costs.first(pixel); d <= costs.last(pixel); ++d) {
         int transition = p2;
         if (!starts && costs.has(before, d)) transition = std::min(transition, costs.at(before, d));
-        if (!starts && costs.has(before, d - 1)) transition = std::min(transition, costs.at(before, d - 1) + q.p1);
-        if (!starts && costs.has(before, d + 1)) transition = std::min(transition, costs.at(before, d + 1) + q.p1);
+        if (!starts && costs.has(before, d - 1)) transition = std::min(transition, costs.at(before, d - 1) + p1);
+        if (!starts && costs.has(before, d + 1)) transition = std::min(transition, costs.at(before, d + 1) + p1);
         costs.at(pixel, d) = v.cost(x, y, d) + transition;
         least = std::min(least, costs.at(pixel, d));
       }
@@ -166,7 +167,7 @@ void read_off(const View& left, const shared::Band* bands, Cells& sums, testing:
 
 testing::HostMaps banded_sgm(shared::ImageSize size, shared::DisparityRange range, const BandedSgmOptions& options,
                              const std::vector<std::uint64_t> (&codes)[2], const std::vector<std::uint16_t>& grey,
-                             const std::vector<shared::Band>& bands, bool reads_off, int right_row_step) {
+                             const std::vector<shared::Band>& bands, bool reads_off, shared::RowSteps row_steps) {
   const shared::SgmParameters q{.width = size.width,
                                 .height = size.height,
                                 .min_disparity = range.min,
@@ -178,7 +179,7 @@ testing::HostMaps banded_sgm(shared::ImageSize size, shared::DisparityRange rang
                                 .variance_per_step = options.variance_per_step_px2,
                                 .variance_per_square = options.variance_per_square_px2,
                                 .reads_off = reads_off,
-                                .right_row_step = right_row_step,
+                                .row_steps = row_steps,
                                 .first_view = 0};
   testing::HostMaps maps;
   for (int view = 0; view < 2; ++view) {
@@ -200,10 +201,10 @@ testing::HostMaps banded_sgm(shared::ImageSize size, shared::DisparityRange rang
     }
     if (q.reads_off) {
       read_off(v, band, sums, maps);
-      return maps;
+      break;
     }
   }
-  return without_absent_rows(size, right_row_step, maps);
+  return without_absent_rows(size, row_steps, maps);
 }
 
 }  // namespace egosgm::reference

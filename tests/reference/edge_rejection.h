@@ -7,6 +7,6 @@
 namespace egosgm::reference {
 
 testing::HostMaps edge_rejection(shared::ImageSize size, float max_jump_px, const testing::HostMaps& in,
-                                 int right_row_step = 1);
+                                 shared::RowSteps row_steps = {1, 1});
 
 }  // namespace egosgm::reference

@@ -45,8 +45,8 @@ testing::HostMaps fill_holes(shared::ImageSize size, float max_difference_px, co
 }  // namespace
 
 testing::HostMaps hole_fill(shared::ImageSize size, float max_difference_px, const testing::HostMaps& in,
-                            int right_row_step) {
-  return of_present_rows(size, right_row_step, in, [&](shared::ImageSize of, const testing::HostMaps& maps) {
+                            shared::RowSteps row_steps) {
+  return of_present_rows(size, row_steps, in, [&](shared::ImageSize of, const testing::HostMaps& maps) {
     return fill_holes(of, max_difference_px, maps);
   });
 }

@@ -7,6 +7,6 @@
 namespace egosgm::reference {
 
 testing::HostMaps hole_fill(shared::ImageSize size, float max_difference_px, const testing::HostMaps& in,
-                            int right_row_step = 1);
+                            shared::RowSteps row_steps = {1, 1});
 
 }  // namespace egosgm::reference

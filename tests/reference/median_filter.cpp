@@ -39,8 +39,9 @@ testing::HostMaps filter(shared::ImageSize size, bool fill, const testing::HostM
 
 }  // namespace
 
-testing::HostMaps median_filter(shared::ImageSize size, bool fill, const testing::HostMaps& in, int right_row_step) {
-  return of_present_rows(size, right_row_step, in,
+testing::HostMaps median_filter(shared::ImageSize size, bool fill, const testing::HostMaps& in,
+                                shared::RowSteps row_steps) {
+  return of_present_rows(size, row_steps, in,
                          [&](shared::ImageSize of, const testing::HostMaps& maps) { return filter(of, fill, maps); });
 }
 

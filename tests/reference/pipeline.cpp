@@ -69,7 +69,10 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
   frame.unpredicted = !options_.temporal ? "not temporal" : !belief_ ? no_belief_reason_ : !motions ? "no motion" : "";
   const bool has_prediction = frame.unpredicted.empty();
   frame.tracked_views = options_.track_right ? 2 : 1;
-  frame.right_row_step = has_prediction ? right_row_step() : 1;
+  if (has_prediction) {
+    frame.matched_rows = {row_step(), row_step()};
+    if (options_.track_right) frame.tracked_rows.right = row_step();
+  }
   if (has_prediction) predict(*motions, frame);
 
   const int passes = options_.vertical_alignment.enabled && !has_offset_ ? 2 : 1;
@@ -85,7 +88,7 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
                                   : std::vector<std::uint8_t>(frame.result.disparity.size(),
                                                               static_cast<std::uint8_t>(kTrustedEvidence));
   frame.output = frame.result.disparity;
-  const int step = frame.right_row_step;
+  const shared::RowSteps step = frame.tracked_rows;
   if (has_prediction && has_evidence()) {
     testing::HostMaps belief = frame.result;
     belief.evidence = frame.evidence;
@@ -111,9 +114,8 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
   return frame;
 }
 
-int Pipeline::right_row_step() const {
-  const bool skips = options_.search == SearchMode::kBand && options_.track_right && has_evidence();
-  return skips ? options_.banded_sgm.right_row_step : 1;
+int Pipeline::row_step() const {
+  return options_.search == SearchMode::kBand && has_evidence() ? options_.banded_sgm.row_step : 1;
 }
 
 bool Pipeline::has_evidence() const {
@@ -140,9 +142,9 @@ std::vector<std::uint8_t> Pipeline::explain(const Images& images, const Frame& f
 }
 
 void Pipeline::predict(const ViewMotions& motions, Frame& frame) const {
-  const int step = right_row_step();
+  const shared::RowSteps step = frame.tracked_rows;
   shared::DisparityMotion right = motions.right;
-  right.row_step = step;
+  right.row_step = step.right;
   frame.warped = forward_warp(size_, range_, motions.left, right, options_.forward_warp.process_noise_px2, *belief_);
   const float max_jump_px = options_.edge_rejection.max_jump_px;
   const ConsistencyCheckOptions& check = options_.consistency;
@@ -173,7 +175,7 @@ Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOff
   const BandedSgmOptions& sgm = options_.banded_sgm;
   const bool everything = frame.predicted.disparity.empty() || options_.search == SearchMode::kFull;
   const bool reads_off = !frame.predicted.disparity.empty() && !options_.track_right;
-  const int step = everything ? 1 : right_row_step();
+  const shared::RowSteps step = frame.matched_rows;
   Pass pass;
   pass.images = resample(size_, known, images.greys);
   if (!everything && options_.coarse_match.enabled) {
@@ -189,7 +191,7 @@ Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOff
   pass.view_codes = {size_, {both[0], both[1]}};
   pass.codes = padded_codes(size_, both[0], both[1], code_padding_, sgm.cost);
   const std::vector<std::uint16_t> values(pass.images.begin(), pass.images.end());
-  pass.penalties = step_penalties(size_, values, images.bits, sgm);
+  pass.penalties = step_penalties(size_, values, images.bits, sgm, step);
   std::vector<std::uint16_t> grey = values;
   for (std::uint16_t& value : grey) value = static_cast<std::uint16_t>(value >> (images.bits - 8));
   pass.matched = banded_sgm(size_, range_, sgm, both, grey, pass.band.bands, reads_off, step);
@@ -198,9 +200,9 @@ Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOff
   pass.consistent =
       consistency_check(size_, reads_off ? check.read_off_px : check.measurement_px, false, pass.smoothed, step);
   const bool judges_by_evidence = !frame.predicted.disparity.empty() && has_evidence();
-  pass.measured =
-      judges_by_evidence ? pass.consistent : speckle_removal(size_, options_.speckle_removal, pass.consistent);
-  if (reads_off) {
+  pass.measured = row_interpolation(size_, {step.left, reads_off ? step.right : 1}, pass.consistent);
+  if (!judges_by_evidence) pass.measured = speckle_removal(size_, options_.speckle_removal, pass.consistent);
+  if (!judges_by_evidence && reads_off) {
     const std::ptrdiff_t right = static_cast<std::ptrdiff_t>(pass.measured.disparity.size() / 2);
     std::copy(pass.consistent.disparity.begin() + right, pass.consistent.disparity.end(),
               pass.measured.disparity.begin() + right);
@@ -222,10 +224,10 @@ void Pipeline::update(const Images& images, bool stands, Frame& frame) const {
     evidence = FrameEvidence{
         frame.warped.evidence,
         block_evidence(options_.kalman_update.gate_px, pass.view_codes, coarse, frame.predicted, pass.measured),
-        images.greys == greys_, stands && coarse.has_value(), right_row_step()};
+        images.greys == greys_, stands && coarse.has_value(), frame.tracked_rows};
     frame.block_evidence = evidence->blocks.evidence;
   }
-  const int step = right_row_step();
+  const shared::RowSteps step = frame.tracked_rows;
   frame.fused =
       kalman_update(size_, options_.kalman_update, frame.predicted, pass.measured, evidence ? &*evidence : nullptr);
   frame.fused = without_absent_rows(size_, step, frame.fused);

@@ -43,7 +43,8 @@ struct Pass {
 /// What every stage of a frame gave. Maps of stages that did not run are empty.
 struct Frame {
   std::string unpredicted;
-  int tracked_views = 2, right_row_step = 1;  // every so many-th row of the right view is there
+  int tracked_views = 2;
+  shared::RowSteps tracked_rows{1, 1}, matched_rows{1, 1};
   testing::HostMaps warped, without_edges, filled, predicted;
   std::vector<Pass> passes;  // two where nothing was known of the vertical offset
   testing::HostMaps fused, fused_smoothed, fused_consistent, updated;
@@ -70,7 +71,7 @@ class Pipeline {
   Pass match(const Images& images, const Frame& frame, const VerticalOffset& known) const;
   void update(const Images& images, bool stands, Frame& frame) const;
   bool has_evidence() const;
-  int right_row_step() const;  // of frames with a prediction
+  int row_step() const;  // of what a frame with a prediction matches
   std::vector<std::uint8_t> explain(const Images& images, const Frame& frame) const;
 
   shared::ImageSize size_;

@@ -6,7 +6,7 @@
 
 namespace egosgm::reference {
 
-/// Fills the rows of the right view between every `right_row_step`-th one.
-testing::HostMaps row_interpolation(shared::ImageSize size, int right_row_step, const testing::HostMaps& in);
+/// Fills the rows of both views between those that are there.
+testing::HostMaps row_interpolation(shared::ImageSize size, shared::RowSteps row_steps, const testing::HostMaps& in);
 
 }  // namespace egosgm::reference

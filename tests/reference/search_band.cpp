@@ -59,11 +59,11 @@ std::pair<float, float> found_around(shared::ImageSize size, const std::vector<f
   return {found[kCoarseOutliers], found[found.size() - 1 - kCoarseOutliers]};
 }
 
-/// Disparities of both views; of the right one, every so many-th row is there.
+/// Disparities of both views, of the rows that are there.
 struct PresentMap {
   shared::ImageSize size;
   const std::vector<float>& disparity;
-  int right_row_step;
+  shared::RowSteps row_steps;
 };
 
 /// What is predicted in the blocks from (first_x, first_y) to (last_x, last_y).
@@ -73,7 +73,7 @@ struct Predicted {
 };
 Predicted predicted_in(const PresentMap& map, int view, int first_x, int first_y, int last_x, int last_y) {
   const shared::ImageSize size = map.size;
-  const int step = view == EGOSGM_LEFT ? 1 : map.right_row_step;
+  const int step = shared::row_step_of(view, map.row_steps);
   Predicted found;
   for (int y = std::max(0, first_y * EGOSGM_BLOCK); y < std::min(size.height, (last_y + 1) * EGOSGM_BLOCK); y += step) {
     for (int x = std::max(0, first_x * EGOSGM_BLOCK); x < std::min(size.width, (last_x + 1) * EGOSGM_BLOCK); ++x) {
@@ -144,12 +144,13 @@ void sum_rows(shared::ImageSize size, const std::vector<float>& disparity, Searc
 }  // namespace
 
 SearchBands search_band(shared::ImageSize size, shared::DisparityRange range, const SearchBandOptions& options,
-                        const testing::HostMaps& predicted, const std::vector<float>& coarse, int right_row_step) {
+                        const testing::HostMaps& predicted, const std::vector<float>& coarse,
+                        shared::RowSteps row_steps) {
   const int blocks_x = (size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
   const int blocks_y = (size.height + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
   std::vector<shared::Band> of_blocks;
   std::vector<std::pair<float, float>> found;
-  const PresentMap disparities{size, predicted.disparity, right_row_step};
+  const PresentMap disparities{size, predicted.disparity, row_steps};
   for (int view = 0; view < 2; ++view) {
     for (int y = 0; y < blocks_y; ++y) {
       for (int x = 0; x < blocks_x; ++x) {

@@ -31,7 +31,7 @@ struct Case {
   BandedSgm::Tile tile = {};
   bool reads_off = false;
   int patch = 1;  // pixels a side of what has one prediction
-  int right_row_step = 1;
+  shared::RowSteps row_steps{1, 1};
 };
 
 std::string name(const ::testing::TestParamInfo<Case>& info) {
@@ -48,7 +48,8 @@ std::string name(const ::testing::TestParamInfo<Case>& info) {
   }
   if (c.tile.block_lanes > 0) text += "_blocks" + std::to_string(c.tile.block_lanes);
   if (c.reads_off) text += "_read_off";
-  if (c.right_row_step > 1) text += "_rows" + std::to_string(c.right_row_step);
+  if (c.row_steps.left > 1) text += "_rows" + std::to_string(c.row_steps.left);
+  if (c.row_steps.right > 1) text += "_right_rows" + std::to_string(c.row_steps.right);
   if (c.group) text += "_lanes" + std::to_string(c.group->lanes) + "_lines" + std::to_string(c.group->lines);
   return text;
 }
@@ -91,7 +92,7 @@ struct Match {
   std::vector<Stripe> stripes;
   shared::DisparityRange range;
   bool reads_off = false;
-  int right_row_step = 1;
+  shared::RowSteps row_steps{1, 1};
   BandedSgmOptions options;
 };
 
@@ -117,15 +118,15 @@ Match match(const Case& c, int max_memory_mib = 0) {
     predicted.variance.write(context, maps.variance);
     SearchBand(context, c.size, c.range, {.min_half_width_px = 1}).narrow(predicted, {}, bands, Views::kBoth);
   }
-  const auto steps = reference::step_penalties(c.size, m.grey, 8, m.options);
+  const auto steps = reference::step_penalties(c.size, m.grey, 8, m.options, c.row_steps);
   const auto penalties = testing::on_device<cl_uchar>(context, {steps.begin(), steps.end()});
   const MatchInputs inputs{device_codes, penalties, bands};
   if (c.reads_off) sgm.prepare_reading_off();
-  c.reads_off ? sgm.reading_off(inputs, measured) : sgm.match(inputs, measured, {2, c.right_row_step});
+  c.reads_off ? sgm.reading_off(inputs, measured, {1, c.row_steps}) : sgm.match(inputs, measured, {2, c.row_steps});
 
   m.range = c.range;
   m.reads_off = c.reads_off;
-  m.right_row_step = c.right_row_step;
+  m.row_steps = c.row_steps;
   m.bands = bands.bands.read(context);
   m.measured = testing::download(context, measured);
   m.stripes = sgm.stripes();
@@ -150,9 +151,8 @@ TEST_P(BandedSgmTest, EqualsReference) {
   const Match m = match(c);
   ASSERT_EQ(m.stripes.size(), 1u);
   const auto expected =
-      reference::banded_sgm(c.size, m.range, m.options, m.codes, m.grey, m.bands, m.reads_off, m.right_row_step);
-  EXPECT_TRUE(
-      testing::same_maps(reference::without_absent_rows(c.size, m.right_row_step, m.measured), expected, c.size));
+      reference::banded_sgm(c.size, m.range, m.options, m.codes, m.grey, m.bands, m.reads_off, m.row_steps);
+  EXPECT_TRUE(testing::same_maps(reference::without_absent_rows(c.size, m.row_steps, m.measured), expected, c.size));
 }
 
 /// `rows` rows of every one of `planes` planes, from `first` on.
@@ -175,7 +175,7 @@ testing::HostMaps stripe_by_stripe(const Match& m, shared::ImageSize size) {
     };
     const std::vector<std::uint64_t> codes[2] = {cut(m.codes[0], 1), cut(m.codes[1], 1)};
     const auto maps = reference::banded_sgm({size.width, stripe.rows}, m.range, m.options, codes, cut(m.grey, 2),
-                                            cut(m.bands, 2), m.reads_off, m.right_row_step);
+                                            cut(m.bands, 2), m.reads_off, m.row_steps);
     for (int view = 0; view < 2; ++view) {
       const std::ptrdiff_t kept = static_cast<std::ptrdiff_t>(stripe.kept_end - stripe.kept_begin) * size.width;
       const std::ptrdiff_t to = (static_cast<std::ptrdiff_t>(view) * size.height + stripe.kept_begin) * size.width;
@@ -205,12 +205,12 @@ TEST(BandedSgmStripes, EqualTheReferenceOfEach) {
                    .scheduling = scheduling,
                    .launches = reads_off ? BandedSgm::Launches::kWaves : BandedSgm::Launches::kSweepsOfAView,
                    .reads_off = reads_off,
-                   .right_row_step = reads_off ? 1 : 2};
+                   .row_steps = {2, 2}};
       const Match m = match(c, scheduling == Scheduling::kPaths ? 4 : 2);
       ASSERT_GE(m.stripes.size(), 3u);
       expect_few_rows(m.stripes, c.size.height);
       const auto present = [&](const testing::HostMaps& maps) {
-        return reference::without_absent_rows(c.size, m.right_row_step, maps);
+        return reference::without_absent_rows(c.size, m.row_steps, maps);
       };
       EXPECT_TRUE(testing::same_maps(present(m.measured), present(stripe_by_stripe(m, c.size)), c.size));
     }
@@ -315,7 +315,10 @@ std::vector<Case> changed(std::vector<Case> cases, Changes... changes) {
 
 void along_paths(Case& c) { c.scheduling = Scheduling::kPaths; }
 void read_off(Case& c) { c.reads_off = true; }
-void in_few_rows(Case& c) { c.right_row_step = c.size.width % 2 == 0 ? 2 : 3; }
+void in_few_rows(Case& c) {
+  const int step = c.size.width % 2 == 0 ? 2 : 3;
+  c.row_steps = {c.reads_off || c.size.height % 2 == 1 ? step : 1, step};
+}
 void whole_sweeps(Case& c) { c.launches = BandedSgm::Launches::kSweeps; }
 void view_by_view(Case& c) { c.launches = BandedSgm::Launches::kSweepsOfAView; }
 
@@ -389,6 +392,10 @@ INSTANTIATE_TEST_SUITE_P(FewRowsViewByView, BandedSgmTest, ValuesIn(changed(kBan
 INSTANTIATE_TEST_SUITE_P(FewRowsSmallTiles, BandedSgmTest, ValuesIn(changed(in_small_tiles(), in_few_rows)), name);
 INSTANTIATE_TEST_SUITE_P(FewRowsPaths, BandedSgmTest, ValuesIn(changed(kBanded, in_few_rows, along_paths)), name);
 INSTANTIATE_TEST_SUITE_P(FewRowsGroupedPaths, BandedSgmTest, ValuesIn(changed(in_groups(), in_few_rows)), name);
+INSTANTIATE_TEST_SUITE_P(ReadOffFewRows, BandedSgmTest, ValuesIn(changed(changed(kBanded, read_off), in_few_rows)),
+                         name);
+INSTANTIATE_TEST_SUITE_P(ReadOffFewRowsPaths, BandedSgmTest,
+                         ValuesIn(changed(changed(changed(kBanded, read_off), in_few_rows), along_paths)), name);
 INSTANTIATE_TEST_SUITE_P(GroupedPaths, BandedSgmTest, ValuesIn(in_groups()), name);
 
 }  // namespace

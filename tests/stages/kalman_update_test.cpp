@@ -117,10 +117,10 @@ TEST_P(KalmanUpdateTest, EqualsReferenceWithEvidence) {
     testing::expect_reference(
         size, before,
         [&](int pixels, Views views) { return update(size, {}, predicted, measured, pixels, views, &evidence); },
-        [&](int step) {
-          evidence.right_row_step = step;
+        [&](shared::RowSteps steps) {
+          evidence.row_steps = steps;
           const auto present = [&](const testing::HostMaps& maps) {
-            return reference::without_absent_rows(size, step, maps);
+            return reference::without_absent_rows(size, steps, maps);
           };
           return present(reference::kalman_update(size, {}, present(predicted), present(measured), &evidence));
         });

@@ -11,12 +11,14 @@ namespace {
 
 using testing::kNone;
 
-testing::HostMaps interpolate(shared::ImageSize size, int right_row_step, const testing::HostMaps& maps,
+testing::HostMaps interpolate(shared::ImageSize size, shared::RowSteps steps, const testing::HostMaps& maps,
                               int pixels = 0) {
   ocl::Context context(testing::any_device());
   RowInterpolation stage(context, size, pixels);
   StereoMaps on_device = testing::upload(context, size, maps);
-  stage.interpolate(right_row_step, on_device.disparity, on_device.variance);
+  for (const int view : {EGOSGM_LEFT, EGOSGM_RIGHT}) {
+    stage.interpolate(view, steps, on_device.disparity, on_device.variance);
+  }
   return testing::download(context, on_device);
 }
 
@@ -25,21 +27,23 @@ EGOSGM_TEST_AT_ALL_SIZES(RowInterpolationTest);
 TEST_P(RowInterpolationTest, EqualsReference) {
   const shared::ImageSize size = GetParam();
   const testing::HostMaps maps = testing::random_maps(size, 0, 4, 0.2, 51);
-  for (const auto& [step, pixels] : {std::pair{2, 1}, {2, 16}, {3, 1}, {3, 16}}) {
-    const testing::HostMaps expected = testing::masked(reference::row_interpolation(size, step, maps));
-    EXPECT_TRUE(testing::same_maps(interpolate(size, step, maps, pixels), expected, size))
-        << "by " << pixels << ", row step " << step;
+  for (const shared::RowSteps steps : {shared::RowSteps{1, 2}, {2, 1}, {3, 3}}) {
+    const testing::HostMaps expected = testing::masked(reference::row_interpolation(size, steps, maps));
+    for (const int pixels : {1, 16}) {
+      EXPECT_TRUE(testing::same_maps(interpolate(size, steps, maps, pixels), expected, size))
+          << "by " << pixels << ", row steps " << steps.left << ", " << steps.right;
+    }
   }
 }
 
 // The right view is a column; the left one stays.
-TEST(RowInterpolation, TakesTheMeanOrTheSurerOfTwoRows) {
+TEST(RowInterpolation, TakesTheMeanOfTwoRowsOrTheOnlyOne) {
   const std::vector<float> left(8, 9.0f), variances{2, 2, 2, 2, 2, 2, 2, 2, 1, 8, 3, 8, 2, 8, 5, 8};
   testing::HostMaps maps{left, variances};
   for (const float d : {4.0f, 0.0f, 5.0f, 0.0f, 7.0f, 0.0f, kNone, 0.0f}) maps.disparity.push_back(d);
-  const testing::HostMaps out = interpolate({1, 8}, 2, maps);
-  EXPECT_EQ(out.disparity, (std::vector<float>{9, 9, 9, 9, 9, 9, 9, 9, 4, 4.5f, 5, 7, 7, kNone, kNone, kNone}));
-  EXPECT_EQ(out.variance, (std::vector<float>{2, 2, 2, 2, 2, 2, 2, 2, 1, 2, 3, 2, 2, 0, 0, 0}));
+  const testing::HostMaps out = interpolate({1, 8}, {1, 2}, maps);
+  EXPECT_EQ(out.disparity, (std::vector<float>{9, 9, 9, 9, 9, 9, 9, 9, 4, 4.5f, 5, kNone, 7, 7, kNone, kNone}));
+  EXPECT_EQ(out.variance, (std::vector<float>{2, 2, 2, 2, 2, 2, 2, 2, 1, 2, 3, 0, 2, 2, 0, 0}));
 }
 
 }  // namespace

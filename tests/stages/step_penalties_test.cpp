@@ -41,19 +41,19 @@ TEST_P(StepPenaltiesTest, EqualsReference) {
     const int bits = type == PixelType::kU8 ? 8 : 16;
     const std::vector<std::uint16_t> grey = random_grey(size, bits);
     const shared::ImageSize of_steps{4 * size.width, size.height};
-    const std::vector<std::uint8_t> expected = reference::step_penalties(size, grey, bits, kOptions);
+    const std::vector<std::uint8_t> of_all = reference::step_penalties(size, grey, bits, kOptions);
     const std::vector<std::uint8_t> before(StepPenalties::bytes(size), kUntouched);
     for (const int pixels : {1, 16}) {
-      for (const int step : {1, 2}) {
+      for (const shared::RowSteps rows : {shared::RowSteps{1, 1}, {1, 2}, {2, 2}}) {
         const auto present = [&](const std::vector<std::uint8_t>& steps) {
-          return reference::without_absent_rows(of_steps, step, steps, std::uint8_t{0});
+          return reference::without_absent_rows(of_steps, rows, steps, std::uint8_t{0});
         };
-        EXPECT_TRUE(testing::same_bits(present(penalties(size, grey, type, kOptions, pixels, {2, step})),
-                                       present(expected), of_steps))
-            << "by " << pixels << ", row step " << step;
+        EXPECT_TRUE(testing::same_bits(present(penalties(size, grey, type, kOptions, pixels, {2, rows})),
+                                       present(reference::step_penalties(size, grey, bits, kOptions, rows)), of_steps))
+            << "by " << pixels << ", row steps " << rows.left << rows.right;
       }
       EXPECT_TRUE(testing::same_bits(penalties(size, grey, type, kOptions, pixels, Views::kLeft),
-                                     testing::left_and_right(expected, before), of_steps))
+                                     testing::left_and_right(of_all, before), of_steps))
           << "the left view alone, by " << pixels;
     }
   }

@@ -54,22 +54,22 @@ std::vector<T> in_padded_rows(shared::ImageSize size, const std::vector<T>& valu
   return padded;
 }
 
-/// Runs a stage on single pixels and on vectors of them: of both views, of every second row of the right one, and of
-/// the left one alone. What `run(pixels, views)` gives must be what `twin(right_row_step)` does, and `before` in a
-/// right view that was left alone.
+/// Runs a stage on single pixels and on vectors of them: of both views, of every second row of the right one and
+/// of both, and of the left one alone. What `run(pixels, views)` gives must be what `twin(row_steps)` does, and
+/// `before` in a right view that was left alone.
 template <typename Run, typename Twin>
 void expect_reference(shared::ImageSize size, const HostMaps& before, const Run& run, const Twin& twin) {
   for (const int pixels : {1, 16}) {
-    for (const Views& views : {Views::kBoth, Views{2, 2}, Views::kLeft}) {
-      SCOPED_TRACE("by " + std::to_string(pixels) + ", " + std::to_string(views.count) + " views, row step " +
-                   std::to_string(views.right_row_step));
+    for (const Views& views : {Views::kBoth, Views{2, {1, 2}}, Views{2, {2, 2}}, Views::kLeft}) {
+      SCOPED_TRACE("by " + std::to_string(pixels) + ", " + std::to_string(views.count) + " views, row steps " +
+                   std::to_string(views.row_steps.left) + std::to_string(views.row_steps.right));
       const HostMaps found = run(pixels, views);
-      HostMaps expected = twin(views.right_row_step);
+      HostMaps expected = twin(views.row_steps);
       if (found.variance.empty()) expected.variance.clear();
       if (views == Views::kLeft) {
         EXPECT_TRUE(same_maps(found, left_and_right(expected, before), size));
       } else {
-        EXPECT_TRUE(same_maps(reference::without_absent_rows(size, views.right_row_step, found), expected, size));
+        EXPECT_TRUE(same_maps(reference::without_absent_rows(size, views.row_steps, found), expected, size));
       }
     }
   }
