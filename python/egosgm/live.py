@@ -213,6 +213,7 @@ class PageOutput:
 def _parser() -> Parser:
     parser = Parser("live", description="Match what two cameras see as they see it, and show it on a page in the browser. Pairs are dropped rather than late.")
     add = parser.add_argument_group("input (one of); each is a camera, such as 0 or /dev/video0, or a video").add_argument
+    add("cameras", metavar="CAMERA", nargs="*", help="the left and the right camera, as --left and --right take them")
     add("--left", metavar="CAMERA", help="the left camera")
     add("--right", metavar="CAMERA", help="the right camera")
     add("--side-by-side", metavar="CAMERA", help="a camera with the left view in the left half and the right one in the right half")
@@ -244,6 +245,12 @@ def main(arguments: Sequence[str]) -> int:
     if not 0 <= given.port < 65536:
         raise _egosgm.InvalidArgument(f"--port {given.port}: choose from 0 to 65535")
     options = _options(given.set)
+    if len(given.cameras) == 1:
+        raise _egosgm.InvalidArgument(f"{given.cameras[0]}: one camera: say how its views lie, by --side-by-side or --top-bottom, or give a right one too")
+    if given.cameras:
+        if len(given.cameras) > 2 or given.left or given.right:
+            raise _egosgm.InvalidArgument(f"{' '.join(given.cameras)}: too many cameras: give a left and a right one")
+        given.left, given.right = given.cameras
     if given.record:
         _egosgm._expect_new_folder("--record", pathlib.Path(given.record))
     pairs = LivePairs(given.left, given.right, side_by_side=given.side_by_side, top_bottom=given.top_bottom, calib=given.calib, unit_m=unit_m(given.unit),

@@ -271,6 +271,8 @@ def main(arguments: Sequence[str]) -> int:
         given.truth = given.positional_truth
     if not 16 <= given.picture_width <= _MOST_SIDE:
         raise _egosgm.InvalidArgument(f"--picture-width {given.picture_width}: choose from 16 to {_MOST_SIDE}")
+    if re.fullmatch(r"report\.(json|html)", pathlib.Path(given.run).name) and pathlib.Path(given.run).is_file():
+        given.run = pathlib.Path(given.run).parent
     file = pathlib.Path(given.out) if given.out else pathlib.Path(given.run) / "report.html"
     try:
         page = _Page(given)

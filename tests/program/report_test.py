@@ -145,7 +145,7 @@ class Report(ReportTest):
 
     def test_chosen_frames_and_where_the_page_goes(self):
         page = self.new_folder() / "page.html"
-        self.assert_works("report", self.out, "--pictures", "3,000001", "--picture-width", 100, "--out", page)
+        self.assert_works("report", self.out / "report.json", "--pictures", "3,000001", "--picture-width", 100, "--out", page)
         data = self.data(page)
         self.assertEqual([picture["frame"] for picture in data["pictures"]], [1, 3])
         self.assertEqual([layer["name"] for layer in data["pictures"][0]["layers"]], LAYERS[:-1])
