@@ -32,9 +32,9 @@ void MatchStep::measure(const Plan& plan, const FrameImages& images, const Searc
   const Views views{2, plan.matched.row_steps};
   StereoMaps matched{matching.matched, measured.variance};
   if (reads_off) {
-    matcher_.reading_off(images, bands, matched, plan.matched);
+    matcher_.reading_off(images, bands, matched, plan.matched, plan.coded_rows());
   } else {
-    matcher_.match(images, bands, matched, plan.matched);
+    matcher_.match(images, bands, matched, plan.matched, plan.coded_rows());
   }
   if (median_filter_) median_filter_->filter(matching.matched, matching.smoothed, views);
   const Map& smoothed = median_filter_ ? matching.smoothed : matching.matched;

@@ -28,6 +28,10 @@ struct Plan {
   Wanted wanted;
 
   bool predicts() const { return !why_not; }
+  /// The rows that need codes: those that are matched; reasons ask for those around each pixel.
+  shared::RowSteps coded_rows() const {
+    return wanted.has(Output::kReason) ? shared::RowSteps{1, 1} : matched.row_steps;
+  }
   /// The views that are tracked, or both where the right one is made of the left one.
   Views with_right() const { return tracked == Views::kLeft ? Views::kBoth : tracked; }
 };

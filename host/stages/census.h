@@ -19,10 +19,14 @@ class Census {
   Census(ocl::Context& context, shared::ImageSize size, PixelType type, MatchingCost cost, int padding, int pixels = 0,
          int words = 0);
 
-  /// `images`: both views' pixels, the left view first, without gaps.
-  void encode(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes) { encode(images, codes, false); }
+  /// `images`: both views' pixels, the left view first, without gaps. Leaves the codes of absent rows as they are.
+  void encode(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes, shared::RowSteps row_steps = {1, 1}) {
+    encode(images, codes, row_steps, false);
+  }
   /// Which pixels of each window are about as bright as its centre. REQUIRES: the census of 9x7 of 16 bits.
-  void encode_alike(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes) { encode(images, codes, true); }
+  void encode_alike(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes) {
+    encode(images, codes, {1, 1}, true);
+  }
 
   /// 32-bit words of a code, and of all codes.
   static int words(MatchingCost cost) { return cost == MatchingCost::kCensus9x7 ? 2 : 1; }
@@ -31,11 +35,11 @@ class Census {
            std::max(code_words, words(cost));
   }
 
-  using Kernel = ocl::Kernel<const shared::ImageSize, const cl_int, const cl_int, const ocl::Buffer<cl_uchar>,
-                             ocl::Buffer<cl_uint>>;
+  using Kernel = ocl::Kernel<const shared::ImageSize, const shared::RowSteps, const cl_int, const cl_int,
+                             const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uint>>;
 
  private:
-  void encode(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes, bool alike);
+  void encode(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes, shared::RowSteps row_steps, bool alike);
 
   ocl::Stage stage_;
   const cl_int padding_;

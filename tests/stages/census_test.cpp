@@ -43,13 +43,25 @@ TEST_P(CensusTest, EqualsReference) {
   ocl::Context context(testing::any_device());
   Census census(context, size, type, cost, padding, pixels);
   ocl::Buffer<cl_uint> codes(context, Census::words(cost, size, padding));
-  census.encode(both(context, views, type), codes);
+  const auto images = both(context, views, type);
+  census.encode(images, codes);
 
-  const auto expected = reference::padded_codes(size, reference::codes(size, views[0], 8 * bytes, cost),
-                                                reference::codes(size, views[1], 8 * bytes, cost), padding, cost);
-  const auto actual = codes.read(context);
-  EXPECT_TRUE(testing::same_bits(std::vector<std::uint32_t>(actual.begin(), actual.end()), expected,
-                                 {(size.width + 2 * padding) * Census::words(cost), size.height}));
+  auto expected = reference::padded_codes(size, reference::codes(size, views[0], 8 * bytes, cost),
+                                          reference::codes(size, views[1], 8 * bytes, cost), padding, cost);
+  const shared::ImageSize rows_of_words{(size.width + 2 * padding) * Census::words(cost), size.height};
+  const auto read = [&] {
+    const auto words = codes.read(context);
+    return std::vector<std::uint32_t>(words.begin(), words.end());
+  };
+  EXPECT_TRUE(testing::same_bits(read(), expected, rows_of_words));
+
+  codes.write(context, std::vector<cl_uint>(expected.size(), 7));
+  census.encode(images, codes, {2, 3});
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    const int row = static_cast<int>(i / rows_of_words.width);
+    if (row % size.height % (row < size.height ? 2 : 3) != 0) expected[i] = 7;
+  }
+  EXPECT_TRUE(testing::same_bits(read(), expected, rows_of_words));
 }
 
 using AlikeCase = std::tuple<shared::ImageSize, int>;
