@@ -50,22 +50,22 @@
 // A pixel's evidence is a sum over frames, at most MOST: of what it was, so many 64ths are kept, and a frame adds what
 // its images say, less what noise must not reach. What was chosen in this frame alone, and not by the coarse match too,
 // has that much less, as the best of many is better than chance. Below 0, the pixel dies; it is confirmed from
-// CONFIRMED on, and given out by itself from TRUSTED on, with which a full-range match that both views confirm begins.
+// CONFIRMED on, and given out by itself from TRUSTED on.
 // A match outside of the other image cannot be asked: so many 64ths of its evidence are kept.
 #define EGOSGM_EVIDENCE_MOST 160
 #define EGOSGM_EVIDENCE_KEPT 45
 #define EGOSGM_EVIDENCE_KEPT_UNSEEN 58
 #define EGOSGM_EVIDENCE_OF_NOISE 24
 #define EGOSGM_EVIDENCE_OF_CHOICE 48
-#define EGOSGM_EVIDENCE_CONFIRMED 32
-// A pixel with less than TRUSTED is published where COUNT of the pixels on a grid around are confirmed and differ by no
+#define EGOSGM_EVIDENCE_CONFIRMED 64
+// A pixel with less than TRUSTED is published where confirmed pixels on a grid around, to all four sides, differ by no
 // more than SAME_SURFACE, and is named flat: the images hardly say that it is there. A measurement that no prediction
-// shares counts where LEAST of them are measured as much, but for LONE.
+// shares counts where LEAST of them are measured as much, but for LONE; COUNT while the camera stands.
 #define EGOSGM_EVIDENCE_TRUSTED 96
-#define EGOSGM_SUPPORTERS_RADIUS 16
+#define EGOSGM_SUPPORTERS_RADIUS 24
 #define EGOSGM_SUPPORTERS_STEP 8
-#define EGOSGM_SUPPORTERS_COUNT 8
 #define EGOSGM_SUPPORTERS_LEAST 1
+#define EGOSGM_SUPPORTERS_COUNT 12
 #define EGOSGM_LONE_PX 2.0f
 #define EGOSGM_SAME_SURFACE_PX 4.0f
 // The coarse match confirms a disparity that differs by no more than one of its pixels.

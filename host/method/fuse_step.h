@@ -40,14 +40,9 @@ class FuseStep {
     const CoarseView* coarse;
   };
 
-  /// REQUIRES: the plan predicts.
+  /// REQUIRES: the plan fuses.
   void update(const Plan& plan, const Matched& matched, const Prediction& prediction, const StereoMaps& measured,
               Fusion& fusion, Belief& belief);
-
-  /// A belief without a prediction.
-  void begin(Belief& belief) {
-    if (evidence_) evidence_->begin(belief.evidence);
-  }
 
   /// Writes which of a belief's disparities are published. REQUIRES: the method has evidence.
   void publish(const Plan& plan, const Belief& belief, Map& confirmed);

@@ -7,7 +7,7 @@ namespace egosgm {
 FrameResults Method::frame(const Plan& plan, const FrameImages& uploaded, const Belief& before, Belief& after,
                            const OutputMaps& output) {
   Workspace& w = work_;
-  StereoMaps measured = plan.predicts() ? w.measured : after.maps;
+  StereoMaps measured = plan.fuses ? w.measured : after.maps;
   VerticalOffset offset = before.offset.is_known ? before.offset : unknown_;
   FrameImages images = uploaded;
 
@@ -29,14 +29,18 @@ FrameResults Method::frame(const Plan& plan, const FrameImages& uploaded, const 
     publish_.write(plan,
                    {{images, match_.matcher().codes(), plan.grey_step, measured, match_.speckle_runs(plan)},
                     prediction,
-                    {after.maps, result, w.fusion.doubtful, evidence_of(plan, after), w.fusion.evidence.evidence}},
+                    {after.maps, result, w.fusion.doubtful, evidence_of(after), w.fusion.evidence.evidence}},
                    before, after, output.variance, w.published);
   });
   return {{result, output.variance}, measured, offset, images};
 }
 
 void Method::predict(const Plan& plan, const Belief& belief, Prediction& prediction) {
-  if (plan.predicts()) predict_->predict(plan, belief, prediction);
+  if (plan.predicts()) {
+    predict_->predict(plan, belief, prediction);
+  } else if (plan.fuses) {
+    predict_->predict_nothing(prediction);
+  }
 }
 
 FrameImages Method::align(const FrameImages& uploaded, const VerticalOffset& offset, FrameImages& aligned) {
@@ -54,25 +58,23 @@ void Method::refine(const FrameImages& images, const StereoMaps& measured, const
 
 void Method::fuse(const Plan& plan, const FrameImages& images, const Prediction& prediction, const StereoMaps& measured,
                   Fusion& fusion, Belief& belief) {
-  if (plan.predicts()) {
+  if (plan.fuses) {
     std::optional<CoarseView> coarse;
     if (plan.has_coarse_match) coarse.emplace(CoarseView{search_.coarse_images(), work_.coarse});
     fuse_->update(plan, {images, match_.matcher().codes(), coarse ? &*coarse : nullptr}, prediction, measured, fusion,
                   belief);
-  } else if (fuse_) {
-    fuse_->begin(belief);
   }
   belief.why_not.reset();
   if (!options_.temporal) belief.forget(Unpredicted::kNotTemporal);  // a frame alone leaves nothing to the next one
 }
 
-/// Null where all of a belief is published: the method has no evidence, or the frame no prediction.
-const FlagMap* Method::evidence_of(const Plan& plan, const Belief& belief) const {
-  return plan.predicts() && fuse_->has_evidence() ? &belief.evidence : nullptr;
+/// Null where all of a belief is published: the method has no evidence.
+const FlagMap* Method::evidence_of(const Belief& belief) const {
+  return fuse_ && fuse_->has_evidence() ? &belief.evidence : nullptr;
 }
 
 Map Method::confirmed(const Plan& plan, const Belief& belief, Map& confirmed) {
-  if (!evidence_of(plan, belief)) return belief.maps.disparity;
+  if (!evidence_of(belief)) return belief.maps.disparity;
   fuse_->publish(plan, belief, confirmed);
   return confirmed;
 }

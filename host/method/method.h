@@ -23,7 +23,7 @@ struct Workspace {
   Map coarse;                   // disparities that CoarseMatch found
   SearchBands bands;
   Matching matching;
-  StereoMaps measured;  // where there is a prediction to fuse it with; else the belief's memory
+  StereoMaps measured;  // where it is fused; else the belief's memory
   Fusion fusion;
   Published published;
 
@@ -72,7 +72,7 @@ class Method {
   void fuse(const Plan& plan, const FrameImages& images, const Prediction& prediction, const StereoMaps& measured,
             Fusion& fusion, Belief& belief);
   Map confirmed(const Plan& plan, const Belief& belief, Map& confirmed);
-  const FlagMap* evidence_of(const Plan& plan, const Belief& belief) const;
+  const FlagMap* evidence_of(const Belief& belief) const;
 
   const MethodOptions options_;
   Workspace work_;

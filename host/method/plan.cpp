@@ -23,6 +23,7 @@ Plan plan_of(const MethodOptions& options, std::optional<Unpredicted> why_no_bel
              const std::optional<Motion>& motion, const Wanted& wanted, bool repeats) {
   Plan plan{};
   plan.why_not = why_not(options, why_no_belief, motion);
+  plan.fuses = plan.predicts() || Evidence::is_of(options);
   const bool searches_bands = plan.predicts() && options.search == SearchMode::kBand;
   plan.motion = plan.predicts() ? motion : std::nullopt;
   plan.search = searches_bands ? Search::kBands : Search::kEverything;
@@ -34,9 +35,10 @@ Plan plan_of(const MethodOptions& options, std::optional<Unpredicted> why_no_bel
     if (options.track_right) plan.tracked.row_steps.right = step;
   }
   plan.matches = options.vertical_alignment.enabled && !knows_offset ? 2 : 1;
-  plan.has_coarse_match = searches_bands && options.coarse_match.enabled;
+  plan.has_coarse_match = plan.fuses && options.search == SearchMode::kBand && options.coarse_match.enabled;
   plan.repeats = repeats;
-  plan.sees_again = plan.has_coarse_match && motion->current_from_previous.matrix().isIdentity(kStands);
+  plan.sees_again =
+      plan.predicts() && plan.has_coarse_match && motion->current_from_previous.matrix().isIdentity(kStands);
   plan.wanted = wanted;
   return plan;
 }

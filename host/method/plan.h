@@ -20,6 +20,7 @@ struct Plan {
   Search search;
   Views tracked;  // predicted and fused
   Views matched;  // where it is the left one, the right one is read off its match
+  bool fuses;     // a prediction, or nothing, with what is measured
   int matches;    // 2 where the first one gives the vertical offset
   bool has_coarse_match;
   bool repeats;         // the images are those of the frame before

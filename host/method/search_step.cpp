@@ -18,8 +18,8 @@ void SearchStep::prepare(PixelType type) {
 
 void SearchStep::plan_bands(const Plan& plan, const FrameImages& images, const Prediction& prediction, Map& coarse,
                             SearchBands& bands) {
+  if (plan.has_coarse_match) coarse_match_->match(images, coarse);
   if (plan.search == Search::kBands) {
-    if (plan.has_coarse_match) coarse_match_->match(images, coarse);
     const Map* found = plan.has_coarse_match ? &coarse : nullptr;
     search_band_.narrow(prediction.maps, found, bands, plan.matched);
   } else if (plan.predicts()) {

@@ -52,8 +52,6 @@ void Evidence::operator()(const ocl::Buffer<cl_uint>& codes, const CoarseView* c
                 coarse ? coarse->disparity : blocks.found, alike_, sums_, blocks.evidence, blocks.found);
 }
 
-void Evidence::begin(FlagMap& evidence) { evidence.fill(stage_.enter(), EGOSGM_EVIDENCE_TRUSTED); }
-
 void Evidence::publish(const Map& disparity, const FlagMap& evidence, Map& confirmed, Views views, Views tracked) {
   stage_.launch_pixels(publish_, views.count, views.row_steps, tracked == Views::kLeft, disparity, evidence, confirmed);
 }

@@ -37,9 +37,6 @@ class Evidence {
   void operator()(const ocl::Buffer<cl_uint>& codes, const CoarseView* coarse, const Map& predicted,
                   const Map& measured, BlockEvidence& blocks, Views views);
 
-  /// Starts a belief without a prediction: a match that both views confirm over the full range begins with some
-  /// evidence.
-  void begin(FlagMap& evidence);
   /// Writes the disparities that are confirmed. `tracked`: the views that have evidence of their own.
   void publish(const Map& disparity, const FlagMap& evidence, Map& confirmed, Views views, Views tracked);
 

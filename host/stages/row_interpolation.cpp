@@ -8,7 +8,7 @@ RowInterpolation::RowInterpolation(ocl::Context& context, shared::ImageSize size
       interpolate_(stage_, "interpolate_rows") {}
 
 void RowInterpolation::interpolate(cl_int view, shared::RowSteps steps, Map& disparity, Map& variance) {
-  const cl_int step = view == EGOSGM_LEFT ? steps.left : steps.right;
+  const cl_int step = shared::row_step_of(view, steps);
   if (step > 1) stage_.launch_pixels(interpolate_, /*views=*/1, view, step, disparity, variance);
 }
 

@@ -286,9 +286,9 @@ KERNEL void gather_evidence(const ImageSize size, const int has_coarse, const in
   gather_row(THIS_WORK_ITEM, size, has_coarse, coarse_padding, coarse, alike, sums, evidence, found);
 }
 
-// Publishes of a belief the pixels with much evidence, and those with little where confirmed pixels around lie on the
-// same surface. Where the left view alone is tracked (by_left), a right pixel has the evidence of the left pixel that
-// it sees, and must be confirmed itself.
+// Publishes of a belief the pixels with much evidence, and those with little within confirmed ones of the same surface.
+// Where the left view alone is tracked (by_left), a right pixel has the evidence of the left pixel that it sees, and
+// must be confirmed itself.
 COMPILED_ONCE void publish_row(const WorkItem at, const ImageSize size, const RowSteps row_steps, const int by_left,
                                global const float* disparity, global const uchar* evidence, global float* published) {
   if (!has_row(at, row_steps)) return;
@@ -310,8 +310,8 @@ COMPILED_ONCE void publish_row(const WorkItem at, const ImageSize size, const Ro
     Ints is_given = (d > INVALID) & (of_pixels >= (asks_left ? EGOSGM_EVIDENCE_CONFIRMED : EGOSGM_EVIDENCE_TRUSTED));
     if (!asks_left) {
       const size_t view = row - left_row;
-      is_given |= have_supporters(size, x, at.y, (d > INVALID) & !is_given, (Ints)(EGOSGM_SUPPORTERS_COUNT), d,
-                                  EGOSGM_SAME_SURFACE_PX, disparity + view, evidence + view);
+      is_given |= have_supporters(size, x, at.y, (d > INVALID) & !is_given, (Ints)(0), d, EGOSGM_SAME_SURFACE_PX,
+                                  disparity + view, evidence + view);
     }
     store_pixels(is_given ? d : INVALID, published + row, x, width);
   }

@@ -210,7 +210,7 @@ COMPILED_ONCE void explain_row(const WorkItem at, const ImageSize size, const fl
     const Ints is_speckle = has_runs ? has_run(runs + row, x, width) & !is_measured : (Ints)(0);
     const Ints is_uncovered = has_prediction ? (jump_in_row(warped + row, x, width) > jump) & !is_warped : (Ints)(0);
     const Texture texture = texture_around(size, (global const Pixel*)images, x, y);
-    Ints is_weak = 0, is_sure = 0;  // sure: more than a full-range match begins with, so images have confirmed it
+    Ints is_weak = 0, is_sure = 0;
     if (has_evidence) {
       const Ints of_pixel = load_bytes(evidence + row, x, width);
       is_sure = has_value & (of_pixel > EGOSGM_EVIDENCE_TRUSTED);

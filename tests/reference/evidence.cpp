@@ -148,20 +148,22 @@ Verdict judge(shared::ImageSize size, float gate_px, const FrameEvidence& frame,
   return {evidence, evidence >= 0, !stays || now >= kEvidenceOfNoise};
 }
 
-int supporters_of(shared::ImageSize size, const testing::HostMaps& maps, std::size_t view, int x, int y, float d,
-                  float most) {
-  int supporters = 0;
-  for (const int dy : {-16, -8, 0, 8, 16}) {
-    for (const int dx : {-16, -8, 0, 8, 16}) {
+Supporters supporters_of(shared::ImageSize size, const testing::HostMaps& maps, std::size_t view, int x, int y, float d,
+                         float most) {
+  Supporters result{0, x < 8, x + 8 >= size.width, y < 8, y + 8 >= size.height};
+  for (const int dy : {-24, -16, -8, 0, 8, 16, 24}) {
+    for (const int dx : {-24, -16, -8, 0, 8, 16, 24}) {
       const int u = x + dx, v = y + dy;
       if ((dx == 0 && dy == 0) || u < 0 || v < 0 || u >= size.width || v >= size.height) continue;
       const std::size_t i = view + static_cast<std::size_t>(v) * size.width + u;
       const float other = maps.disparity[i];
       const bool is_confirmed = maps.evidence.empty() || maps.evidence[i] >= kConfirmedEvidence;
-      supporters += is_valid(other) && std::abs(other - d) <= most && is_confirmed;
+      if (!is_valid(other) || std::abs(other - d) > most || !is_confirmed) continue;
+      ++result.count;
+      result.left |= dx<0, result.right |= dx> 0, result.above |= dy<0, result.below |= dy> 0;
     }
   }
-  return supporters;
+  return result;
 }
 
 std::vector<float> confirmed(shared::ImageSize size, const testing::HostMaps& belief, bool by_left) {
@@ -178,7 +180,8 @@ std::vector<float> confirmed(shared::ImageSize size, const testing::HostMaps& be
       of_pixel = is_inside ? belief.evidence[i - pixels - x + static_cast<std::size_t>(seen)] : 0;
       is_given = of_pixel >= kConfirmedEvidence;
     } else {
-      is_given = of_pixel >= kTrustedEvidence || supporters_of(size, belief, i / pixels * pixels, x, y, d, 4) >= 8;
+      is_given =
+          of_pixel >= kTrustedEvidence || supporters_of(size, belief, i / pixels * pixels, x, y, d, 4).surround();
     }
     if (!is_valid(d) || !is_given) result[i] = EGOSGM_INVALID_DISPARITY;
   }

@@ -47,10 +47,17 @@ struct Verdict {
 Verdict judge(shared::ImageSize size, float gate_px, const FrameEvidence& frame, int view, int x, int y,
               float predicted, float measured);
 
-/// How many of the 24 pixels 8 and 16 px around one of the view that begins at `view` differ from `d` by at most
+/// The supporters of a pixel: how many there are, and to which sides, or whether the image ends there.
+struct Supporters {
+  int count;
+  bool left, right, above, below;
+  bool surround() const { return left && right && above && below; }
+};
+
+/// Of the 48 pixels 8, 16 and 24 px around one of the view that begins at `view`, those that differ from `d` by at most
 /// `most`. Where the maps have evidence, those count that are confirmed.
-int supporters_of(shared::ImageSize size, const testing::HostMaps& maps, std::size_t view, int x, int y, float d,
-                  float most);
+Supporters supporters_of(shared::ImageSize size, const testing::HostMaps& maps, std::size_t view, int x, int y, float d,
+                         float most);
 
 /// What is published of a belief with its evidence: what has much, and what confirmed pixels around support. `by_left`:
 /// a right pixel has the evidence of the left pixel that it sees, and must be confirmed itself.

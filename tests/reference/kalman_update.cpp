@@ -80,8 +80,8 @@ testing::HostMaps kalman_update(shared::ImageSize size, const KalmanUpdateOption
       const float d = predicted.disparity[i];
       const bool is_new = d == EGOSGM_INVALID_DISPARITY || std::abs(of_measurement.disparity - d) > options.gate_px;
       if (is_valid(of_measurement) && is_new &&
-          supporters_of(size, measured, first, x, y, of_measurement.disparity, 2) <
-              (evidence->sees_again && d == EGOSGM_INVALID_DISPARITY ? 8 : 1)) {
+          supporters_of(size, measured, first, x, y, of_measurement.disparity, 2).count <
+              (evidence->sees_again && d == EGOSGM_INVALID_DISPARITY ? 12 : 1)) {
         of_measurement = kNone;
       }
       verdict = judge(size, options.gate_px, *evidence, i / pixels, x, y, d, of_measurement.disparity);

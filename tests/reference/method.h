@@ -12,7 +12,7 @@ inline constexpr int kThinReach = 8;
 // Evidence, in sixteenths of a bit; controls in pixels from the match.
 inline constexpr int kControls[4] = {-14, -8, 8, 14};
 inline constexpr int kCoarseControls[8] = {-19, -14, -10, -7, 7, 10, 14, 19};
-inline constexpr int kConfirmedEvidence = 32;
+inline constexpr int kConfirmedEvidence = 64;
 inline constexpr int kEvidenceOfChoice = 48;
 inline constexpr int kEvidenceOfNoise = 24;
 inline constexpr int kMostEvidence = 160;

@@ -81,15 +81,14 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
     frame.vertical_offset_px = known.terms_px[0];
     frame.passes.push_back(match(images, frame, known));
   }
-  if (has_prediction) update(images, motions->stand, frame);
+  const bool fuses = has_prediction || has_evidence();
+  if (fuses) update(images, has_prediction && motions->stand, frame);
 
-  frame.result = has_prediction ? frame.updated : frame.passes.back().measured;
-  frame.evidence = has_prediction ? frame.fused.evidence
-                                  : std::vector<std::uint8_t>(frame.result.disparity.size(),
-                                                              static_cast<std::uint8_t>(kTrustedEvidence));
+  frame.result = fuses ? frame.updated : frame.passes.back().measured;
+  frame.evidence = frame.fused.evidence;
   frame.output = frame.result.disparity;
   const shared::RowSteps step = frame.tracked_rows;
-  if (has_prediction && has_evidence()) {
+  if (has_evidence()) {
     testing::HostMaps belief = frame.result;
     belief.evidence = frame.evidence;
     frame.output = confirmed(size_, belief, !options_.track_right);
@@ -119,26 +118,25 @@ int Pipeline::row_step() const {
 }
 
 bool Pipeline::has_evidence() const {
-  return options_.evidence.enabled && options_.banded_sgm.cost == MatchingCost::kCensus9x7;
+  return options_.temporal && options_.evidence.enabled && options_.banded_sgm.cost == MatchingCost::kCensus9x7;
 }
 
 std::vector<std::uint8_t> Pipeline::explain(const Images& images, const Frame& frame) const {
   const Pass& pass = frame.passes.back();
-  return reasons(
-      size_, options_,
-      {.images = pass.images,
-       .white = images.bits == 8 ? 255 : 65535,
-       .grey_step = grey_step(size_.width, images),
-       .codes = pass.codes,
-       .code_padding = code_padding_,
-       .warped = frame.warped.disparity,
-       .hidden = frame.predicted.hidden,
-       .consistent = pass.consistent.disparity,
-       .measured = pass.measured.disparity,
-       .belief = {frame.output, frame.result.variance},
-       .doubtful = frame.fused.doubtful,
-       .evidence = !frame.predicted.disparity.empty() && has_evidence() ? frame.evidence : std::vector<std::uint8_t>{},
-       .block_evidence = frame.block_evidence});
+  return reasons(size_, options_,
+                 {.images = pass.images,
+                  .white = images.bits == 8 ? 255 : 65535,
+                  .grey_step = grey_step(size_.width, images),
+                  .codes = pass.codes,
+                  .code_padding = code_padding_,
+                  .warped = frame.warped.disparity,
+                  .hidden = frame.predicted.hidden,
+                  .consistent = pass.consistent.disparity,
+                  .measured = pass.measured.disparity,
+                  .belief = {frame.output, frame.result.variance},
+                  .doubtful = frame.fused.doubtful,
+                  .evidence = has_evidence() ? frame.evidence : std::vector<std::uint8_t>{},
+                  .block_evidence = frame.block_evidence});
 }
 
 void Pipeline::predict(const ViewMotions& motions, Frame& frame) const {
@@ -178,7 +176,8 @@ Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOff
   const shared::RowSteps step = frame.matched_rows;
   Pass pass;
   pass.images = resample(size_, known, images.greys);
-  if (!everything && options_.coarse_match.enabled) {
+  const bool fuses = !frame.predicted.disparity.empty() || has_evidence();
+  if (fuses && options_.search == SearchMode::kBand && options_.coarse_match.enabled) {
     pass.coarse = coarse_match(size_, options_, pass.images, images.bits);
     std::tie(pass.coarse_codes, pass.coarse_alike) = coarse_codes(size_, pass.images, images.bits);
   }
@@ -217,19 +216,20 @@ Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOff
 
 void Pipeline::update(const Images& images, bool stands, Frame& frame) const {
   const Pass& pass = frame.passes.back();
+  const bool has_prediction = !frame.predicted.disparity.empty();
+  const testing::HostMaps predicted = has_prediction ? frame.predicted : testing::empty_maps(size_);
   std::optional<FrameEvidence> evidence;
   if (has_evidence()) {
     std::optional<CoarseView> coarse;
     if (!pass.coarse.empty()) coarse = CoarseView{pass.coarse_codes, pass.coarse_alike, pass.coarse};
-    evidence = FrameEvidence{
-        frame.warped.evidence,
-        block_evidence(options_.kalman_update.gate_px, pass.view_codes, coarse, frame.predicted, pass.measured),
-        images.greys == greys_, stands && coarse.has_value(), frame.tracked_rows};
+    evidence =
+        FrameEvidence{has_prediction ? frame.warped.evidence : std::vector<std::uint8_t>(predicted.disparity.size(), 0),
+                      block_evidence(options_.kalman_update.gate_px, pass.view_codes, coarse, predicted, pass.measured),
+                      images.greys == greys_, stands && coarse.has_value(), frame.tracked_rows};
     frame.block_evidence = evidence->blocks.evidence;
   }
   const shared::RowSteps step = frame.tracked_rows;
-  frame.fused =
-      kalman_update(size_, options_.kalman_update, frame.predicted, pass.measured, evidence ? &*evidence : nullptr);
+  frame.fused = kalman_update(size_, options_.kalman_update, predicted, pass.measured, evidence ? &*evidence : nullptr);
   frame.fused = without_absent_rows(size_, step, frame.fused);
   frame.fused_smoothed = options_.median_filter.enabled ? median_filter(size_, true, frame.fused, step) : frame.fused;
   if (!options_.track_right) {

@@ -31,7 +31,7 @@ class Pixels {
     const Window window = around(x, y);
     if (2 * window.extreme >= window.pixels) return Reason::kSaturated;
     const bool is_judged = d != kNone && !in_.evidence.empty();
-    const bool is_sure = is_judged && in_.evidence[i] > kTrustedEvidence;  // more than a full-range match begins with
+    const bool is_sure = is_judged && in_.evidence[i] > kTrustedEvidence;
     if (!is_sure &&
         static_cast<float>(window.changes) < kLeastChange * in_.grey_step * static_cast<float>(window.pixels)) {
       return Reason::kFlat;

@@ -246,35 +246,47 @@ TEST(Evidence, GivesOutWhatHasMuchOrIsSupported) {
   }
 }
 
-// A pixel without evidence of its own, on the surface of those 8 and 16 px around.
-TEST(Evidence, GivesOutWhatHasLittleWithinASurface) {
-  constexpr shared::ImageSize kSurface{33, 33};
-  constexpr std::size_t kMiddle = 16 * 33 + 16;
-  const auto gives = [&](float d, int supporters, int of_them, int of_pixel) {
+// A pixel without evidence of its own, on the surface of some that are 8, 16 and 24 px away.
+TEST(Evidence, PublishesWhatHasLittleWithinASurface) {
+  constexpr shared::ImageSize kSurface{65, 65};
+  struct Place {
+    int dx, dy;
+  };
+  using Places = std::vector<Place>;
+  const auto publishes = [&](float d, const Places& supporters, int of_them, int of_pixel, int x = 32, int y = 32) {
     testing::HostMaps maps = testing::empty_maps(kSurface);
     maps.evidence.assign(maps.disparity.size(), 0);
-    maps.disparity[kMiddle] = d;
-    maps.evidence[kMiddle] = static_cast<std::uint8_t>(of_pixel);
-    for (int i = 0; i < 25 && supporters > 0; ++i) {
-      const std::size_t pixel = i / 5 * 8 * 33 + i % 5 * 8;
-      if (pixel == kMiddle) continue;
-      maps.disparity[pixel] = 20;
-      maps.evidence[pixel] = static_cast<std::uint8_t>(of_them);
-      --supporters;
-    }
+    const auto set = [&](int u, int v, float disparity, int evidence) {
+      maps.disparity[v * kSurface.width + u] = disparity;
+      maps.evidence[v * kSurface.width + u] = static_cast<std::uint8_t>(evidence);
+    };
+    set(x, y, d, of_pixel);
+    for (const Place& place : supporters) set(x + place.dx, y + place.dy, 20, of_them);
     ocl::Context context(testing::any_device());
     FlagMap evidence = testing::on_device(context, maps.evidence);
     Map published(context, maps.disparity.size());
     Evidence(context, kSurface, options())
         .publish(testing::upload(context, kSurface, maps).disparity, evidence, published, Views::kBoth, Views::kBoth);
-    return published.read(context)[kMiddle] == d;
+    return published.read(context)[y * kSurface.width + x] == d;
   };
-  EXPECT_TRUE(gives(20, 8, 32, 0));
-  EXPECT_FALSE(gives(20, 7, 32, 95)) << "too few";
-  EXPECT_FALSE(gives(20, 24, 31, 95)) << "not confirmed";
-  EXPECT_TRUE(gives(24, 24, 32, 0)) << "a slope";
-  EXPECT_FALSE(gives(24.5f, 24, 32, 0)) << "another surface";
-  EXPECT_TRUE(gives(20, 0, 0, 96)) << "it has much itself";
+  const Places around = {{-8, 0}, {8, 0}, {0, -8}, {0, 8}};
+  EXPECT_TRUE(publishes(20, around, 64, 0));
+  EXPECT_TRUE(publishes(20, {{-24, -24}, {24, 24}}, 64, 0)) << "corners lie on two sides each";
+  EXPECT_FALSE(publishes(20, {{8, 0}, {0, -8}, {0, 8}}, 64, 95)) << "none on the left";
+  EXPECT_FALSE(publishes(20, {{-8, 0}, {0, -8}, {0, 8}}, 64, 95)) << "none on the right";
+  EXPECT_FALSE(publishes(20, {{-8, 0}, {8, 0}, {0, 8}}, 64, 95)) << "none above";
+  EXPECT_FALSE(publishes(20, {{-8, 0}, {8, 0}, {0, -8}}, 64, 95)) << "none below";
+  EXPECT_FALSE(publishes(20, {{-32, 0}, {32, 0}, {0, -32}, {0, 32}}, 64, 95)) << "too far";
+  EXPECT_FALSE(publishes(20, around, 63, 95)) << "not confirmed";
+  EXPECT_TRUE(publishes(24, around, 64, 0)) << "a slope";
+  EXPECT_FALSE(publishes(24.5f, around, 64, 0)) << "another surface";
+  EXPECT_TRUE(publishes(20, {}, 0, 96)) << "it has much itself";
+  EXPECT_TRUE(publishes(20, {{8, 0}, {0, 8}}, 64, 0, 7, 7)) << "the image ends on the left and above";
+  EXPECT_TRUE(publishes(20, {{-8, 0}, {0, -8}}, 64, 0, 57, 57)) << "the image ends on the right and below";
+  EXPECT_FALSE(publishes(20, {{8, 0}, {0, 8}}, 64, 95, 8, 7)) << "it does not end on the left yet";
+  EXPECT_FALSE(publishes(20, {{-8, 0}, {0, -8}}, 64, 95, 56, 57)) << "nor on the right";
+  EXPECT_FALSE(publishes(20, {{8, 0}, {0, 8}}, 64, 95, 7, 8)) << "nor above";
+  EXPECT_FALSE(publishes(20, {{-8, 0}, {0, -8}}, 64, 95, 57, 56)) << "nor below";
 }
 
 TEST(Evidence, NeedsCodesOfTwoWords) {

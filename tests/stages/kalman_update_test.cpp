@@ -214,8 +214,8 @@ TEST(KalmanUpdate, MovesThePredictionOfWhatMovesByItself) {
   EXPECT_EQ(Window(0.5f, 21).with(141, kNone).middle(), drifted(0, 21)) << "59 are measured";
 }
 
-/// The left pixel in the middle of 25x25, whose match lies in the image, and its evidence. `supporters`: how many of
-/// the pixels 8 and 16 px around were measured the same.
+/// A left pixel in the middle row of 25x49, whose match lies in the image, and its evidence. `supporters`: how many of
+/// the pixels at multiples of 8 px around were measured the same.
 struct Pixel {
   float predicted = kNone, measured = kNone;
   std::uint8_t before = 0;
@@ -231,15 +231,15 @@ struct Judged {
 };
 
 Judged judged(const Pixel& pixel, int x = 12) {
-  constexpr shared::ImageSize kSize{25, 25};
-  constexpr int kPixels = 25 * 25, kBlocks = 7 * 7;
+  constexpr shared::ImageSize kSize{25, 49};
+  constexpr int kPixels = 25 * 49, kBlocks = 7 * 13;
   testing::HostMaps predicted = testing::empty_maps(kSize), measured = predicted;
-  const int i = 12 * 25 + x;
+  const int i = 24 * 25 + x;
   predicted.disparity[i] = pixel.predicted, measured.disparity[i] = pixel.measured;
   int supporters = pixel.supporters;
-  for (const int y : {12, 4, 20}) {
+  for (const int y : {24, 16, 32, 8, 40, 0, 48}) {
     for (const int u : {x + 8, x - 8, x}) {
-      if ((u != x || y != 12) && u >= 0 && u < 25 && supporters-- > 0) measured.disparity[y * 25 + u] = pixel.measured;
+      if ((u != x || y != 24) && u >= 0 && u < 25 && supporters-- > 0) measured.disparity[y * 25 + u] = pixel.measured;
     }
   }
   predicted.variance[i] = measured.variance[i] = 1;
@@ -301,10 +301,11 @@ TEST(KalmanUpdate, ARepeatedPairMakesNobodySurer) {
 }
 
 TEST(KalmanUpdate, WhereTheCameraStandsAPixelBeginsWhatIsSharedAndFoundInTheWholeRange) {
-  EXPECT_EQ(judged({.measured = 5, .now = 96, .found = 9, .sees_again = true, .supporters = 8}),
+  EXPECT_EQ(judged({.measured = 5, .now = 96, .found = 9, .sees_again = true, .supporters = 12}),
             (Judged{{5, 1}, 96 - 24}));
-  EXPECT_EQ(judged({.measured = 5, .now = 96, .found = 9, .sees_again = true, .supporters = 7}), (Judged{kNothing, 0}));
-  EXPECT_EQ(judged({.measured = 5, .now = 160, .sees_again = true, .supporters = 8}), (Judged{kNothing, 0}))
+  EXPECT_EQ(judged({.measured = 5, .now = 96, .found = 9, .sees_again = true, .supporters = 11}),
+            (Judged{kNothing, 0}));
+  EXPECT_EQ(judged({.measured = 5, .now = 160, .sees_again = true, .supporters = 12}), (Judged{kNothing, 0}))
       << "the coarse match did not find it";
   EXPECT_EQ(judged({.predicted = 5, .measured = 9, .before = 128, .now = 90, .sees_again = true}).evidence, 90 - 72)
       << "what moves there contradicts a prediction";

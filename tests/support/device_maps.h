@@ -40,10 +40,4 @@ inline HostMaps with_marks(HostMaps maps) {
   return maps;
 }
 
-/// Both views without any value.
-inline HostMaps empty_maps(shared::ImageSize size) {
-  const std::size_t pixels = 2 * static_cast<std::size_t>(size.width) * size.height;
-  return {std::vector<float>(pixels, EGOSGM_INVALID_DISPARITY), std::vector<float>(pixels, 0.0f)};
-}
-
 }  // namespace egosgm::testing

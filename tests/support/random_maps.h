@@ -21,6 +21,12 @@ struct HostMaps {
   std::vector<std::uint8_t> hidden = {}, doubtful = {}, evidence = {};
 };
 
+/// Both views without any value.
+inline HostMaps empty_maps(shared::ImageSize size) {
+  const std::size_t pixels = 2 * static_cast<std::size_t>(size.width) * size.height;
+  return {std::vector<float>(pixels, EGOSGM_INVALID_DISPARITY), std::vector<float>(pixels, 0.0f)};
+}
+
 /// With variances of 0 where there is no disparity, as they mean nothing there.
 inline HostMaps masked(HostMaps maps) {
   for (std::size_t i = 0; i < maps.variance.size(); ++i) {

@@ -59,9 +59,9 @@ class StageChain {
                                     work.bands.row_sums.read(context_)};
         return;
       case Step::kMatch:
-        return look(work.matching, plan.predicts() ? work.measured : after_.maps, frame.passes.back());
+        return look(work.matching, plan.fuses ? work.measured : after_.maps, frame.passes.back());
       case Step::kFuse:
-        if (plan.predicts()) look(work.fusion, frame);
+        if (plan.fuses) look(work.fusion, frame);
         return;
       case Step::kPublish:
         frame.dynamic = work.published.dynamic.read(context_);
