@@ -51,9 +51,11 @@ SearchBand::SearchBand(ocl::Context& context, shared::ImageSize size, shared::Di
       bands_of_pixels_(stage_, "bands_of_pixels"),
       sum_rows_(stage_, "sum_rows"),
       full_range_(stage_, "full_range") {
-  for (ocl::Buffer<shared::BlockRange>* ranges : {&block_ranges_, &none_}) {
+  // Where the kernel that writes them fails, those that read them must stay in bounds.
+  for (ocl::Buffer<shared::BlockRange>* ranges : {&block_ranges_, &coarse_ranges_, &none_, &found_}) {
     ranges->write(context, std::vector(ranges->size(), shared::BlockRange{}));
   }
+  block_bands_.write(context, std::vector(block_bands_.size(), whole(range)));
 }
 
 void SearchBand::narrow(const StereoMaps& predicted, const Map* coarse, SearchBands& bands, Views views) {
