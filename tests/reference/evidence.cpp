@@ -160,7 +160,10 @@ Supporters supporters_of(shared::ImageSize size, const testing::HostMaps& maps, 
       const bool is_confirmed = maps.evidence.empty() || maps.evidence[i] >= kConfirmedEvidence;
       if (!is_valid(other) || std::abs(other - d) > most || !is_confirmed) continue;
       ++result.count;
-      result.left |= dx<0, result.right |= dx> 0, result.above |= dy<0, result.below |= dy> 0;
+      result.left = result.left || dx < 0;
+      result.right = result.right || dx > 0;
+      result.above = result.above || dy < 0;
+      result.below = result.below || dy > 0;
     }
   }
   return result;
