@@ -40,6 +40,9 @@ void bind_images(py::module_& module) {
       "_holds_mosaic", [](const py::object& grey) { return vision::holds_mosaic(mat_of(grey, "grey")); },
       py::arg("grey"), "Whether a uint8 image is the mosaic of a colour sensor.");
   module.def(
+      "_holds_swapped_bytes", [](const py::object& grey) { return vision::holds_swapped_bytes(mat_of(grey, "grey")); },
+      py::arg("grey"), "Whether the two bytes of each pixel of a uint16 image are exchanged.");
+  module.def(
       "_check_range",
       [](int disparities, int min_disparity) {
         PipelineOptions options;

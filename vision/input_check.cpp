@@ -129,7 +129,10 @@ void InputCheck::add(const Image& left, const Image& right, const FrameReport& r
     const std::optional<Clipped> clipped = clipped_by_range(left, right, least_, end_);
     if (clipped && (!clipped_ || clipped->share > clipped_->share)) clipped_ = clipped;
     ++looks_;
-    if (holds_mosaic(bytes_of(left, right).first)) ++mosaics_;
+    const auto [left_bytes, right_bytes] = bytes_of(left, right);
+    const bool is_swapped = holds_swapped_bytes(left) || holds_swapped_bytes(right);
+    if (is_swapped) ++swapped_;
+    if (!is_swapped && (holds_mosaic(left_bytes) || holds_mosaic(right_bytes))) ++mosaics_;
   }
   const std::uint64_t digests[2] = {digest_of(left), digest_of(right)};
   for (const int side : {0, 1}) {
@@ -154,6 +157,8 @@ std::string InputCheck::text() const {
     append(text, formatted("no motion in %zu of %zu frames", without_motion_, frames_ - 1));
   if (2 * mosaics_ > looks_)
     append(text, "the images are mosaics of colour sensors (Bayer: convert them to grey first)");
+  if (2 * swapped_ > looks_)
+    append(text, "both bytes of each pixel are exchanged (swap them: PNG has the high one first)");
   if (narrow_ == frames_) append(text, "values of 8 bits in images of 16");
   if (2 * far_rows_ > frames_) {
     append(text, formatted("rows of the two views lie %g px apart, the most that is corrected, or farther",

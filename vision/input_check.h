@@ -30,9 +30,10 @@ EGOSGM_EXPORT std::optional<Suspicion> suspect_baseline(double baseline_m, doubl
 EGOSGM_EXPORT std::optional<Suspicion> suspect_calibration(const Calibration& calibration, Size size);
 
 /// Checks a run's input once it is matched: a mean density below a half (maps of good input keep four
-/// fifths and more), no motion in most frames that have one before them, mosaics, images of 16 bits that hold 8, rows
-/// that are farther apart than the vertical alignment corrects, a camera that stands still while the other one does
-/// not, one camera's images on both sides, what is nearer than the range, a suspected calibration.
+/// fifths and more), no motion in most frames that have one before them, mosaics, images of 16 bits that hold 8 or
+/// whose bytes are exchanged, rows that are farther apart than the vertical alignment corrects, a camera that stands
+/// still while the other one does not, one camera's images on both sides, what is nearer than the range, a suspected
+/// calibration.
 class EGOSGM_EXPORT InputCheck {
  public:
   /// `calibration`: none where the images came without one, so that there is no motion either.
@@ -54,7 +55,7 @@ class EGOSGM_EXPORT InputCheck {
   std::size_t frozen_[2] =
       {};  // frames in which one camera's image is that of the frame before, and the other's is not
   std::size_t frames_ = 0, without_motion_ = 0, narrow_ = 0, far_rows_ = 0, same_ = 0;
-  std::size_t looks_ = 0, mosaics_ = 0;
+  std::size_t looks_ = 0, mosaics_ = 0, swapped_ = 0;
   std::optional<Clipped> clipped_;  // of the pair of which the range clips most
 };
 

@@ -10,4 +10,8 @@ namespace egosgm::vision {
 /// columns of even and of odd numbers differ in brightness nearly everywhere. REQUIRES: kU8. Thread-safe.
 EGOSGM_EXPORT bool holds_mosaic(const Image& grey);
 
+/// Whether the two bytes of each pixel are exchanged: as they stand they are noise, and smooth the other way round.
+/// False of images of 8 bits. REQUIRES: kU8 or kU16. Thread-safe.
+EGOSGM_EXPORT bool holds_swapped_bytes(const Image& grey);
+
 }  // namespace egosgm::vision

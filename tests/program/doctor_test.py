@@ -33,6 +33,8 @@ class Doctor(InputTest):
         for check, words, change, *how in (
                 ("matches", "the right images are turned by 180 degrees", lambda image: image[::-1, ::-1], ["image_1"]),
                 ("matches", "the right images are upside down", lambda image: image[::-1], ["image_1"]),
+                ("matches", "the right images are mirrored", lambda image: image[:, ::-1], ["image_1"]),
+                ("matches", "invert them", lambda image: 255 - image, ["image_1"]),
                 ("matches", "coarsely, left and right agree", smooth), ("images", "", lambda image: numpy.full_like(image, 60), ["image_1"]),
                 ("images", "of nearly one tone", lambda image: image / 32), ("images", "of nearly one tone", lambda image: 0 * image)):
             with self.subTest(check=check, words=words):
@@ -46,8 +48,8 @@ class Doctor(InputTest):
         """A street as a sensor sees it whose colours lie in this order, two by two."""
         return self.changed_street(lambda image: scale * numpy.clip(image * numpy.tile(order, (HEIGHT // 2, WIDTH // 2)), 0, 255), **how)
 
-    def wide(self, scale):
-        return self.changed_street(lambda image: scale * image.astype(numpy.uint16), write=write_grey16)
+    def wide(self, scale, change=numpy.array):
+        return self.changed_street(lambda image: change(scale * image.astype(numpy.uint16)), write=write_grey16)
 
     def test_mosaics_of_colour_sensors(self):
         orders = ((0.45, 0.8), (0.8, 1.25)), ((0.95, 0.9), (1.0, 0.95)), ((0.8, 1.25), (0.45, 0.8))
@@ -57,6 +59,8 @@ class Doctor(InputTest):
             self.assertIn("mosaics of colour sensors", finding["text"])
             self.assertNotIn("deinterlace", finding["remedy"])
         self.assertIn("mosaics of colour sensors", self.said_by_run(streets[0]))
+        of_one = self.mosaic(orders[0], sides=["image_1"])
+        self.assertIn("mosaics of colour sensors", self.said_by_run(of_one) + self.assert_only_problem("images", of_one)["text"])
 
     def test_changed_values_of_which_run_tells_too(self):
         random, same = numpy.random.default_rng(1), self.broken_street()
@@ -66,6 +70,7 @@ class Doctor(InputTest):
         two_levels = self.changed_street(lambda image: numpy.where(image + chessboard + random.integers(0, 9, image.shape) > 128, 255, 0))
         for check, words, run_says, street in (
                 ("matches", "are the same", "images are the same", same), ("images", "2 grey levels in all", "doctor", two_levels),
+                ("images", "both bytes of each pixel exchanged", "both bytes of each pixel are exchanged", self.wide(200, numpy.ndarray.byteswap)),
                 ("images", "no value above 255", "values of 8 bits in images of 16: `egosgm doctor", self.wide(1))):
             with self.subTest(words):
                 said, findings = self.said_by_run(street), self.examine(street, code=2)
@@ -76,7 +81,7 @@ class Doctor(InputTest):
 
     def test_images_without_a_problem(self):
         every_other_column_is_brighter = self.mosaic(((1, 1.1), (1, 1.1)))
-        for street in (self.wide(257), every_other_column_is_brighter, self.street):
+        for street in (self.wide(257), self.wide(256), every_other_column_is_brighter, self.street):
             self.assertNotIn("doctor", self.said_by_run(street))
             self.assertEqual(self.examine(street, code=0)["images"]["verdict"], "ok")
 
@@ -102,6 +107,16 @@ class Doctor(InputTest):
         finding = self.assert_only_problem("sides", "--left", self.street / "image_1/%06d.png", "--right", self.street / "image_0/%06d.png",
                                            "--calib", self.street / "calib.txt")
         self.assertIn("swapped", finding["remedy"])
+
+    def test_pairs_that_differ_from_each_other(self):
+        swapped, loose = self.broken_street(), self.broken_street()
+        for i, shift in enumerate((0, 4, -3, 2)):
+            file = loose / f"image_1/{i:06d}.png"
+            write_grey(file, numpy.roll(read_grey(file), shift, 0))
+            for side in (0, 1):
+                shutil.copy(self.street / f"image_{(side + i) % 2}/{i:06d}.png", swapped / f"image_{side}/{i:06d}.png")
+        self.assertIn("in 2 of 4 pairs that were looked at", self.assert_only_problem("sides", swapped)["text"])
+        self.assertIn("by another distance in each frame, from -3.0 to 4.0 px", self.assert_only_problem("rows", loose)["text"])
 
     def test_a_calibration_of_nothing_or_of_another_scale(self):
         f, cx, cy, _ = self.calibration()
@@ -167,14 +182,17 @@ class Doctor(InputTest):
         found = self.examine(frozen)
         self.assertEqual((found["moments"]["verdict"], found["rows"]["verdict"]), ("note", "ok"))
         self.assertIn("both images are those of the frame before in 1 of 3 steps", found["moments"]["text"])
-        for late, side in (("right", 0), ("left", 1)):
-            street = self.broken_street()
-            for i in range(FRAMES - 1):
-                shutil.copy(self.street / f"image_{side}/{i + 1:06d}.png", street / f"image_{side}/{i:06d}.png")
-            for image in ("image_0", "image_1"):
-                (street / image / f"{FRAMES - 1:06d}.png").unlink()
+        for late, side, lag, words in (("right", 0, 1, "a frame"), ("left", 1, 1, "a frame"), ("right", 0, 2, "2 frames")):
+            street, frames = self.new_folder() / "street", FRAMES + lag
+            self.assert_works("synth", "--out", street, "--frames", frames, "--width", WIDTH, "--height", HEIGHT, "--seed", 7)
+            for i in range(frames):
+                if i < lag:
+                    (street / f"image_{side}/{i:06d}.png").unlink()
+                    (street / f"image_{1 - side}/{frames - 1 - i:06d}.png").unlink()
+                else:
+                    (street / f"image_{side}/{i:06d}.png").rename(street / f"image_{side}/{i - lag:06d}.png")
             (street / "times.txt").unlink()
-            self.assertIn(f"the {late} images are a frame late", self.assert_only_problem("moments", street)["text"])
+            self.assertIn(f"the {late} images are {words} late", self.assert_only_problem("moments", street)["text"])
 
     def test_rows_of_two_moments(self):
         street = self.broken_street()
@@ -184,6 +202,9 @@ class Doctor(InputTest):
                 image[1::2] = read_grey(self.street / f"image_{side}/{i + 1:06d}.png")[1::2]
                 write_grey(street / f"image_{side}/{i:06d}.png", image)
         self.assertIn("interlaced", self.assert_only_problem("images", street)["text"])
+        shutil.rmtree(street / "image_0")
+        shutil.copytree(self.street / "image_0", street / "image_0")
+        self.assertEqual(self.examine(street, code=2)["images"]["verdict"], "problem")
         brighter = 20 * (numpy.arange(HEIGHT) % 2)[:, None]  # as some sensors' rows are
         self.assertEqual(self.examine(self.changed_street(lambda image: numpy.clip(image + brighter, 0, 255)))["images"]["verdict"], "ok")
 

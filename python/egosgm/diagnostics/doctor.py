@@ -3,7 +3,7 @@
 import argparse
 import itertools
 import math
-from typing import Any, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import cv2
 import numpy as np
@@ -17,6 +17,7 @@ from ..videos import VideoSource
 
 _MOST_GAP = 1.6  # of the usual time between two frames
 _LEAST_STEP_S, _MOST_STEP_S = 1e-4, 20.0  # between two frames
+_MOST_LATE = 2  # frames that a camera may be late and is found to be
 _LEAST_LATE_PX = 0.4  # rows of another moment are farther apart
 _MOST_PAIRED_PX = 1.0  # rows of one moment are not
 _MOST_OF_STREAM = 300  # frames of a bag or a video, which is read from its start on
@@ -166,14 +167,20 @@ def _of_times(times: Sequence[float], source: str, names: Sequence[str], numbers
                    f"record without dropping frames, or run the parts alone: --frames :{numbers[first]} and --frames {numbers[first + 1]}:")
 
 
+def _steps(pairs: Dict[int, _Pair], places: Sequence[int], lag: int) -> List[Tuple[_Pair, _Pair]]:
+    return [(pairs[place], pairs[place + lag]) for place in places if place in pairs and place + lag in pairs]
+
+
 def _spread_px(left: Any, right: Any) -> float:
     """Rows of 90 % of the matches are no farther apart, beside a constant; infinite where there are few."""
     matches = match_pair(left, right)
     return spread(matches[:, 3] - matches[:, 1]) if len(matches) >= FEWEST_MATCHES else math.inf
 
 
-def _moments(steps: Sequence[Tuple[_Pair, _Pair]]) -> List[Finding]:
-    """A camera that stands still, or is a frame late, or pictures that come again."""
+def _moments(pairs: Dict[int, _Pair], places: Sequence[int]) -> List[Finding]:
+    """A camera that stands still, or is some frames late, or pictures that come again. pairs: by their places."""
+    laters = [_steps(pairs, places, lag) for lag in range(1, _MOST_LATE + 1)]
+    steps = laters[0]
     for this, other in (("left", "right"), ("right", "left")):
         frozen = sum(np.array_equal(getattr(a, this), getattr(b, this)) and not np.array_equal(getattr(a, other), getattr(b, other)) for a, b in steps)
         if frozen:
@@ -181,11 +188,12 @@ def _moments(steps: Sequence[Tuple[_Pair, _Pair]]) -> List[Finding]:
                             "one is not", "leave such pairs out: they are of other moments")]
     own = float(np.median([_spread_px(b.left, b.right) for _, b in steps])) if steps else 0.0
     if own > _LEAST_LATE_PX:
-        late = zip(*((_spread_px(a.left, b.right), _spread_px(b.left, a.right)) for a, b in steps))
-        for name, spread in zip(("right", "left"), (float(np.median(spreads)) for spreads in late)):
-            if spread < min(0.5 * own, _MOST_PAIRED_PX):
-                return [Finding("problem", "moments", f"the {name} images are a frame late: so paired, rows agree within {spread:.2f} px, as they are within {own:.2f} px",
-                                "leave out the first image of that camera, and the last one of the other")]
+        late = [(float(np.median([_spread_px(*views) for views in pairing])), lag, name) for lag, later in enumerate(laters, 1) if later
+                for name, pairing in (("right", [(a.left, b.right) for a, b in later]), ("left", [(b.left, a.right) for a, b in later]))]
+        spread, lag, name = min(late)
+        if spread < min(0.5 * own, _MOST_PAIRED_PX):
+            return [Finding("problem", "moments", f"the {name} images are {'a frame' if lag == 1 else f'{lag} frames'} late: so paired, rows agree within {spread:.2f} px, as they "
+                            f"are within {own:.2f} px", f"leave out the first {counted(lag, 'image')} of that camera, and as many last ones of the other")]
     repeated = sum(np.array_equal(a.left, b.left) and np.array_equal(a.right, b.right) for a, b in steps)
     return [Finding("note", "moments", f"both images are those of the frame before in {repeated} of {len(steps)} steps that were looked at",
                     "leave them out: nothing new is seen in them")] if repeated else []
@@ -215,17 +223,15 @@ def _examine(source: _Source, samples: int, least: int, end: int) -> List[Findin
     samples = min(samples, count)
     places = sorted({0 if samples == 1 else i * (count - 1) // (samples - 1) for i in range(samples)})
     examination, looked_at, broken = Examination(source.calibration, least, end), 0, []
-    steps, before = [], None
-    for pair in source.read(sorted({*places, *(place + 1 for place in places if place + 1 < count)})):
+    pairs = {}
+    for pair in source.read(sorted({place + lag for place in places for lag in range(_MOST_LATE + 1) if place + lag < count})):
         if not isinstance(pair, _Pair):
             broken.append(pair)
             continue
         if pair.place in places:
             examination.add(pair.left, pair.right)
             looked_at += 1
-        if before is not None and before.place + 1 == pair.place and before.place in places:
-            steps.append((before, pair))
-        before = pair
+        pairs[pair.place] = pair
     if not looked_at:
         raise broken[0][1] if broken else _egosgm.InvalidArgument("no pair can be looked at")
     if broken:
@@ -233,14 +239,14 @@ def _examine(source: _Source, samples: int, least: int, end: int) -> List[Findin
     of_pairs = examination.findings(count)
     if source.rectified:
         of_pairs[0] = of_pairs[0]._replace(text=f"{of_pairs[0].text}, rectified here by {source.rectified}")
-    moments = _moments(steps) if of_pairs[0].verdict != "problem" else []
+    moments = _moments(pairs, places) if of_pairs[0].verdict != "problem" else []
     if any(finding.verdict == "problem" for finding in moments) or source.is_of_other_moments():  # which explains what rows, sides and range would say
         of_pairs = [finding for finding in of_pairs if finding.check in ("images", "calibration")]
     findings += of_pairs + moments
     is_sound = all(finding.verdict != "problem" for finding in findings)
     findings.append(source.times())
     if is_sound and source.calibration is not None and not examination.is_too_small():
-        findings += _motion(source.calibration, steps)
+        findings += _motion(source.calibration, _steps(pairs, places, 1))
     return findings
 
 

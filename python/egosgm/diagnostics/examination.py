@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is wrong with rectified pairs before they are matched: their images, calibration, rows, sides and range. Needs OpenCV (cv2)."""
-from typing import Any, List, NamedTuple, Optional
+from typing import Any, Callable, Dict, List, NamedTuple, Optional, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,9 +26,13 @@ _LEAST_CONTRAST = 16  # grey levels of 256 between which nearly all pixels lie
 _MOST_SATURATED = 0.25  # of the pixels
 _LEAST_COMB = 1.5  # how much more neighbouring rows differ than those two apart
 _FEWEST_COARSE = 0.03  # of the pixels of the coarse map; below, it says nothing
-_SURE_OF_TURN = 0.15  # of the pixels of the coarse map
 _FEWEST_LEVELS = 9  # grey levels of an image
-_TURNS = {"turned by 180 degrees": (-1, -1), "mirrored": (1, -1), "upside down, as in a mirror": (-1, 1)}  # steps of rows and columns that undo it
+_USUAL_COARSE = 0.25  # of the pixels of the coarse map of most pairs; below, it may be of images that do not belong together as they are
+_SURE_OF_CHANGE = 0.15  # of the same pixels
+_TURN_BACK = "turn them as the left ones are: a camera that is mounted upside down turns its images by 180 degrees where its driver is told to; then calibrate them so"
+_CHANGES: "Dict[str, Tuple[Callable[[NDArray[Any]], NDArray[Any]], str]]" = {  # what undoes it, and the remedy
+    "": (np.array, ""), "turned by 180 degrees": (lambda image: image[::-1, ::-1], _TURN_BACK), "mirrored": (np.fliplr, _TURN_BACK),
+    "upside down, as in a mirror": (np.flipud, _TURN_BACK), "negatives": (np.invert, "invert them: 255 less each value of 8 bits, 65535 less each of 16")}
 
 
 class Finding(NamedTuple):
@@ -92,9 +96,21 @@ def _agreeing(matches: NDArray[np.float32], width: int, height: int) -> NDArray[
     return np.abs(terms @ candidates[counts.argmax()] - errors) <= _AGREEMENT_PX
 
 
+def _comb(image: NDArray[Any]) -> float:
+    """How much more rows that are neighbours differ than those two apart."""
+    rows = image - image.mean(axis=1, keepdims=True, dtype=np.float32)  # some sensors have rows that are brighter
+    near, far = (float(np.abs(np.diff(part, axis=0)).mean()) for part in (rows, rows[::2]))
+    return near / far if far else 0.0
+
+
 def spread(values: NDArray[np.float32]) -> float:
     """How far 90 % of the values lie from the median at most."""
     return float(np.quantile(np.abs(values - np.median(values)), 0.9))
+
+
+def _has_level_rows(matches: NDArray[np.float32]) -> bool:
+    """Whether the rows of a pair are one distance apart, as they are of one moment."""
+    return len(matches) >= FEWEST_MATCHES and spread(matches[:, 3] - matches[:, 1]) <= _MOST_SPREAD_PX
 
 
 def _slopes(places: NDArray[np.float64], errors: NDArray[np.float64]) -> str:
@@ -114,7 +130,7 @@ class Examination:
         self._brightness = np.zeros(2)
         self._contrasts: List[float] = []
         self._levels = 0
-        self._saturated, self._interlaced, self._mosaics = np.zeros(2), 0, 0
+        self._saturated, self._interlaced, self._mosaics, self._swapped = np.zeros(2), 0, 0, 0
         self._matches: List[NDArray[np.float32]] = []
         self._coarse: List[NDArray[np.float32]] = []
         self._coarse_pixels = 0
@@ -130,15 +146,14 @@ class Examination:
         greys = _egosgm._grey_bytes(left, right)
         self._contrasts.append(min(float(np.ptp(np.quantile(image, (0.01, 0.99)))) for image in greys))
         self._levels = max(self._levels, *(np.count_nonzero(np.bincount(image.ravel())) for image in greys))
-        self._mosaics += int(_egosgm._holds_mosaic(greys[0]))
+        self._mosaics += int(any(_egosgm._holds_mosaic(image) for image in greys))
+        self._swapped += int(any(_egosgm._holds_swapped_bytes(image) for image in (left, right)))
         for side, image in enumerate((left, right)):
             self._brightness[side] += image.mean()
             largest = image.max()
             self._saturated[side] += np.mean(image == largest) if largest in (255, 1023, 4095, 16383, 65535) else 0
         if self._height > 2:
-            rows = left - left.mean(axis=1, keepdims=True, dtype=np.float32)  # some sensors have rows that are brighter
-            near, far = (np.abs(np.diff(part, axis=0)).mean() for part in (rows, rows[::2]))
-            self._interlaced += int(near > _LEAST_COMB * far)
+            self._interlaced += int(max(map(_comb, (left, right))) > _LEAST_COMB)
         self._matches.append(matches)
         row_offset = float(np.median(matches[:, 3] - matches[:, 1])) if len(matches) else 0.0
         coarse = _egosgm._coarse_map(left, right, row_offset, self._least, self._end)
@@ -150,16 +165,15 @@ class Examination:
         """pairs: how many there are in all. REQUIRES: add() was called."""
         found = [self._images(pairs), self._of_calibration()]
         matches = np.concatenate(self._matches)
-        if self.is_too_small() or not self._has_contrast() or self._levels < _FEWEST_LEVELS:  # nothing else can be told
+        if self.is_too_small() or not self._has_contrast() or self._levels < _FEWEST_LEVELS or 2 * self._swapped > self._pairs:  # nothing else can be told
             return found
         if self._equal == self._pairs:
             return [*found, Finding("problem", "matches", "the left and the right images are the same", "give the images of both cameras")]
         coarse = np.concatenate(self._coarse)
         is_sure = len(coarse) >= _FEWEST_COARSE * self._coarse_pixels
-        turn = None if is_sure else self._turn()
-        if turn:
-            return [*found, Finding("problem", "matches", f"the right images are {turn}: only so do they show what the left ones do", "turn them as the left ones are: a "
-                                    "camera that is mounted upside down turns its images by 180 degrees where its driver is told to; then calibrate them so")]
+        change = self._change() if len(coarse) < _USUAL_COARSE * self._coarse_pixels else ""
+        if change:
+            return [*found, Finding("problem", "matches", f"the right images are {change}: only so do they show what the left ones do", _CHANGES[change][1])]
         are_related = len(matches) >= _FEWEST_SURE and len(coarse) >= _FEWEST_COARSE / 2 * self._coarse_pixels
         if len(matches) < FEWEST_MATCHES and not are_related:
             remedy = "give them sharper, brighter or with less noise: coarsely, left and right agree" if is_sure else \
@@ -175,19 +189,23 @@ class Examination:
         points = agreeing[:, 0] - agreeing[:, 2] if is_agreed else None
         if not is_sure:
             return [*found, *self._without_texture(points)]
+        swapped = sum(len(part) > 0 and np.mean(part < -self._doffs() - _BEHIND_PX) > 0.5 and _has_level_rows(own) for part, own in zip(self._coarse, self._matches))
+        if 0 < swapped < self._pairs:
+            return [*found, Finding("problem", "sides", f"in {swapped} of {self._pairs} pairs that were looked at, most points lie behind the cameras", "left and right are swapped in these: "
+                                    "exchange their images; a recorder that takes both cameras from one stream, and loses an image, swaps all that follow")]
         behind = self._share_below(coarse, points, -self._doffs() - _BEHIND_PX)
         found.append(self._sides(behind))
         if behind <= 0.5:
             found.append(self._range(coarse, points))
         return found
 
-    def _turn(self) -> Optional[str]:
-        """How the right images are turned, where only then a coarse match finds much in the last pair."""
+    def _change(self) -> str:
+        """How the right images are changed, where only then a coarse match finds much in the last pair."""
         left, right = self._last
-        shares = {name: float(np.isfinite(_egosgm._coarse_map(left, np.ascontiguousarray(right[::rows, ::columns]), 0.0, self._least, self._end)).mean())
-                  for name, (rows, columns) in _TURNS.items()}
+        shares = {name: float(np.isfinite(_egosgm._coarse_map(left, np.ascontiguousarray(undo(right)), 0.0, self._least, self._end)).mean())
+                  for name, (undo, _) in _CHANGES.items()}
         second, best = sorted(shares, key=lambda name: shares[name])[-2:]
-        return best if shares[best] >= max(_SURE_OF_TURN, 2 * shares[second]) else None
+        return best if shares[best] >= max(_SURE_OF_CHANGE, 2 * shares[second]) else ""
 
     def is_too_small(self) -> bool:
         """Whether the images have no place where points are looked for. REQUIRES: add() was called."""
@@ -220,6 +238,9 @@ class Examination:
         if self._levels < _FEWEST_LEVELS:
             return Finding("problem", "images", f"{text}, of {self._levels} grey levels in all: what tells one place from another is gone",
                            "save them with 8 bits; pictures of 1 or 2 bits are not matched well")
+        if 2 * self._swapped > self._pairs:
+            return Finding("problem", "images", f"{text}, both bytes of each pixel exchanged: as they stand they are noise", "swap them (NumPy: image.byteswap()): PNG has the "
+                           "high byte first, and the pixels were written with the low one first")
         if 2 * self._mosaics > self._pairs:
             return Finding("problem", "images", f"{text}, the mosaics of colour sensors (Bayer): neighbouring pixels saw other colours",
                            "convert both images to grey first, as cv2.cvtColor(image, cv2.COLOR_BayerBG2GRAY) does for one order of the colours")
@@ -251,9 +272,13 @@ class Examination:
         of = f"{counted(matches, 'point')} in {counted(self._pairs, 'frame')}"
         if matches < FEWEST_MATCHES:
             return Finding("note", "rows", f"only {of}, too few to measure rows by", "look at frames of things that are not alike")
+        offsets = [np.median(own[:, 3] - own[:, 1]) for own in self._matches if _has_level_rows(own)]
+        if len(offsets) > self._pairs / 2 and np.ptp(offsets) > _MOST_OFFSET_PX + _MOST_SPREAD_PX:
+            return Finding("problem", "rows", f"rows are apart by another distance in each frame, from {min(offsets):.1f} to {max(offsets):.1f} px in the median ({of})",
+                           "fix the cameras to each other, and turn off what steadies their images, electronic or in the lens: no calibration holds else")
         if len(agreeing) < _FEWEST_AGREEING * matches:
             return Finding("note", "rows", f"only {len(agreeing)} of {of} agree on how far rows are apart",
-                           "textures that repeat are mistaken for each other: look at frames of other things")
+                           "textures that repeat are mistaken for each other, or left and right are of other moments: look at frames of other things")
         errors = (agreeing[:, 3] - agreeing[:, 1]).astype(float)
         places = np.stack([np.ones(len(agreeing)), agreeing[:, 0] / self._width, agreeing[:, 1] / self._height], axis=1)
         offset = round(float(np.median(errors)), 2) + 0.0  # no -0.00
