@@ -143,7 +143,7 @@ def _work(arguments: Sequence[str]) -> str:
     truth = truth / "truth" if (truth / "truth").is_dir() else truth
     pairs, missing = _pairs_of(estimate, truth, given.frames)
     notes = [f"{counted(len(missing), 'truth file')} without an estimate, the first is {missing[0]}"] if missing else []
-    counts = []
+    counts, is_same = [], True
     labels, moving = (_place(folder, names, needed=False) for folder, names in ((estimate, ("objects",)), (truth, _MOVING)))
     objects = _Objects(estimate, truth) if labels != _Path() and moving != _Path() else None
     for name, flow in pairs[2].items():
@@ -151,12 +151,15 @@ def _work(arguments: Sequence[str]) -> str:
             raise _egosgm.InvalidArgument(f"{flow.estimate}: its frame has no disparity, or none in the next frame: give one of each")
         true_objects = None if moving == _Path() else _egosgm.read_grey(moving / flow.truth.with_suffix(".png").name)
         maps = _maps_of([of_kind[name] for of_kind in pairs], true_objects)
+        is_same = is_same and all(np.array_equal(estimated, true, equal_nan=True) for estimated, true in zip(*maps))
         counts.append(count_outliers(*maps, None if true_objects is None else true_objects != 0))
         if objects and true_objects is not None:
             own = _egosgm.read_grey(labels / flow.estimate.with_suffix(".png").name)
             if own.shape != true_objects.shape:
                 raise _egosgm.InvalidArgument(f"{labels}: its map of {name} is of another size than the truth: give one of the same frames")
             objects.add(name, own, true_objects, maps[1][0][..., 0])
+    if is_same:
+        notes.append("estimates equal their truth in every pixel: is a file compared with itself, or with a copy of it?")
     evaluation = evaluation_of(counts)
     of_objects = {"objects": objects.figures()} if objects else {}
     if given.json:

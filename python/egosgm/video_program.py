@@ -68,11 +68,13 @@ def read_flow(file: _Path) -> np.ndarray:
         with np.errstate(invalid="ignore"):
             return np.where((np.abs(flow) < 1e9).all(axis=2, keepdims=True), flow, np.nan).astype(np.float32)
     if content[:4] != b"\x89PNG":
-        raise _egosgm.InvalidArgument(f"{file}: not readable optical flow (truncated?): neither KITTI's PNG nor .flo")
+        raise _egosgm.InvalidArgument(f"{file}: not optical flow that is read: KITTI's PNG of 16 bits and .flo are")
     stored = _egosgm._read_stored_image(file)
     if stored.ndim != 3 or stored.shape[2] != 3 or stored.dtype != np.uint16:
         raise _egosgm.InvalidArgument(f"{file}: not optical flow: KITTI's is 16-bit RGB PNG, this one has {1 if stored.ndim == 2 else stored.shape[2]} channel(s) "
                                       f"of {8 * stored.itemsize} bit")
+    if stored[..., 0].max() <= 1 < stored[..., 2].max():
+        raise _egosgm.InvalidArgument(f"{file}: not optical flow: KITTI's PNG says in its third channel what is there, and here the first one does: OpenCV writes BGR; exchange both")
     flow = (stored[..., :2].astype(np.float32) - 32768) / 64
     return np.where(stored[..., 2:] == 0, np.float32(np.nan), flow)
 

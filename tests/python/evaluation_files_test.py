@@ -39,9 +39,11 @@ def test_flow_is_read(tmp_path):
     stored[0, 0] = 1, 32768 + 128, 32768 - 96  # valid, v, u: OpenCV has blue first
     cv2.imwrite(str(tmp_path / "kitti.png"), stored)
     np.testing.assert_array_equal(video_program.read_flow(tmp_path / "kitti.png"), [[[-1.5, 2], [np.nan, np.nan]]])
+    cv2.imwrite(str(tmp_path / "kitti.png"), stored[..., ::-1])
+    expect_refused("OpenCV writes BGR", lambda: video_program.read_flow(tmp_path / "kitti.png"))
 
 
-@pytest.mark.parametrize("content, named", [(b"", "neither KITTI's PNG nor .flo"), (b"PIEH", "truncated"), (flo(2, 2, [0] * 6), "2x2 pixels do not fit"),
+@pytest.mark.parametrize("content, named", [(b"", "KITTI's PNG of 16 bits and .flo are"), (b"PIEH", "truncated"), (flo(2, 2, [0] * 6), "2x2 pixels do not fit"),
                                             (flo(-1, -1, [0, 0]), "truncated"), (b"\x89PNG\r\n\x1a\n", "truncated")])
 def test_what_is_no_flow_is_refused(tmp_path, content, named):
     (tmp_path / "flow").write_bytes(content)

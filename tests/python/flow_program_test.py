@@ -62,6 +62,7 @@ def test_folders_are_compared_frame_by_frame(tmp_path):
     assert figures == {"d1": (pytest.approx(200 / 3), pytest.approx(200 / 3), 3), "d2": (0, 100, 4), "fl": (25, 100, 4), "sf": (100, pytest.approx(200 / 3), 3)}
     assert (result["frames"], list(result["regions"]), result["over_frames"][0]["name"]) == (1, ["all"], "000003")
     text = _work(["--estimate", str(estimate), "--truth", str(tmp_path)])  # a sequence's folder
+    assert "compared with itself" in _work([str(truth), str(truth)]) and "compared with itself" not in text
     assert "1 frame\n" in text and "SF" in text and text.splitlines()[2].split()[:3] == ["all", "66.67", "%"]
 
 
