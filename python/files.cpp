@@ -266,6 +266,10 @@ void bind_files(py::module_& module) {
   module.def("_is_bag", &vision::is_bag, py::arg("path"));
   module.def("_is_video", &vision::is_video, py::arg("file"));
   module.def(
+      "_foreign_kind",
+      [](const path& file) { return vision::foreign_kind(vision::read_file_start(file, vision::kKindBytes), {}); },
+      py::arg("file"), "What a file is by its first bytes, whatever its name, and what to do with it.");
+  module.def(
       "_find_two_cameras",
       [](const path& folder) -> std::optional<std::pair<std::string, std::string>> {
         const auto cameras = vision::find_two_cameras(folder);

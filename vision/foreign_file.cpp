@@ -56,6 +56,15 @@ std::string foreign_kind(std::string_view start, const fs::path& file) {
   const std::string photo = "it is a HEIC or AVIF, as phones write: convert it to PNG or JPEG";
   const std::string misnamed =
       is_image_name(file) ? "" : "it is a PNG or JPEG under another name: name it .png, .jpg or .jpeg";
+  const std::string extension = lower(file.extension().string());
+  const auto rectified = [&](const char* kind, std::initializer_list<std::string_view> extensions) {
+    const bool is_named_so = std::find(extensions.begin(), extensions.end(), extension) != extensions.end();
+    const std::string name(*extensions.begin());
+    return std::string("it is a ") + kind + (is_named_so ? kRectify : " under another name: name it " + name);
+  };
+  const std::string raw = "; a camera's raw picture, as DNG, NEF and CR2 are, has to be developed to PNG";
+  const std::string tiff = rectified("TIFF", {".tif", ".tiff"});
+  const std::string any_tiff = tiff.ends_with(kRectify) ? tiff : tiff + raw;
   const Kind kinds[] = {
       {0, "version https://git-lfs", "it is a pointer of Git LFS, in place of which `git lfs pull` puts the file"},
       {4, "ftyphei", photo},
@@ -72,12 +81,12 @@ std::string foreign_kind(std::string_view start, const fs::path& file) {
       {0, "FLV\x01", kVideo},
       {0, "\0\0\1\xba"sv, kVideo},  // MPEG
       {0, "\x1a\x45\xdf\xa3", kVideo},
-      {0, "II*\0"sv, std::string("it is a TIFF") + kRectify},
-      {0, "MM\0*"sv, std::string("it is a TIFF") + kRectify},
-      {8, "WEBP", std::string("it is a WebP") + kRectify},
-      {0, "P5", std::string("it is a PGM") + kRectify},
-      {0, "P6", std::string("it is a PPM") + kRectify},
-      {0, "BM", std::string("it is a BMP") + kRectify},
+      {0, "II*\0"sv, any_tiff},
+      {0, "MM\0*"sv, any_tiff},
+      {8, "WEBP", rectified("WebP", {".webp"})},
+      {0, "P5", rectified("PGM", {".pgm"})},
+      {0, "P6", rectified("PPM", {".ppm"})},
+      {0, "BM", rectified("BMP", {".bmp"})},
       {0, "PK\x03\x04", archive("a zip archive")},
       {0, "7z\xbc\xaf", archive("a 7z archive")},
       {0, "Rar!", archive("a RAR archive")},

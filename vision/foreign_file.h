@@ -14,7 +14,7 @@ inline constexpr std::size_t kKindBytes = 300;  // of a file, which tell its kin
 
 /// What a file is that people give in place of an image or of a sequence, by its first bytes, else by its name, and
 /// what to do with it: "it is a zip archive: unpack it". Empty where that is not known. Thread-safe.
-std::string foreign_kind(std::string_view start, const std::filesystem::path& file);
+EGOSGM_EXPORT std::string foreign_kind(std::string_view start, const std::filesystem::path& file);
 
 /// Whether it is a file of a video. Thread-safe.
 EGOSGM_EXPORT bool is_video(const std::filesystem::path& file);

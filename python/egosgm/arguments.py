@@ -36,7 +36,8 @@ class Parser(argparse.ArgumentParser):
             name = unknown[0].split("=")[0]
             kind = "unknown option" if name.startswith("-") else "unexpected argument"
             if pathlib.Path(name).suffix and pathlib.Path(name).is_file():
-                self.error(f'{kind} "{name}", a file: did the shell expand a pattern? quote it: \'*.png\'')
+                self.error(f'{kind} "{name}", a file: did the shell expand a pattern? quote it: \'*.png\''
+                           + ("; images are given as --left LEFT --right RIGHT" if "--left" in self._option_string_actions else ""))
             self.error(f'{kind} "{name}"')
         return given
 

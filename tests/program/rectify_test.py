@@ -326,6 +326,9 @@ class Rectify(RectifyTest):
         (folder / "cut.jpg").write_bytes(b"\xff\xd8\xff\xe0" + bytes(200))
         for name, text in (("empty.mp4", ""), ("empty.avi", ""), ("half.txt", f"{raw}/cam0/9.png\n"), ("same.txt", f"{raw}/cam0/9.png {raw}/cam0/9.png\n")):
             (folder / name).write_text(text)
+        others = ("a.pfm", b"Pf\n8 8\n-1\n" + bytes(256), "a map of floats"), ("a.dng", b"II*\0" + bytes(99), "developed to PNG"), ("a.pnm", b"P5\n2 2\n255\nabcd", "name it .pgm")
+        for name, content, _ in others:  # which OpenCV would take for videos
+            (folder / name).write_bytes(content)
         for bits in (8, 16):
             (folder / f"{bits}.png").write_bytes(png(8, 8, bits, [bytes(bits)] * 8))
         left, both = f"--left {raw}/cam0/*.png", f"--left {raw}/cam0/*.png --right {raw}/cam1/%d.png"
@@ -335,6 +338,7 @@ class Rectify(RectifyTest):
             ("--side-by-side {street}/calib.txt", "calib.txt"), (f"{both} --unit inch", "--unit inch"), (f"{both} --alpha 2", "--alpha 2"),
             *((f"--side-by-side {folder}/{name}", name, "not a readable image") for name in ("cut.png", "cut.jpg")),  # one line, whole or not at all
             *((f"--side-by-side {folder}/{name}", name, "neither an image nor a video") for name in ("empty.mp4", "empty.avi")),
+            *((f"--side-by-side {folder}/{name}", words) for name, _, words in others), (f"{folder}/8.png {folder}/16.png", "--left LEFT --right RIGHT"),
             (f"--list {folder}/half.txt", "half.txt:1"), (f"--list {folder}/same.txt", "same.txt:1", "is the left and the right image"),
             (f"--left {folder}/8.png --right {folder}/16.png", "8x8 of 8 bits", "8x8 of 16 bits")), ["rectify"], ["--calib", calib, "--out", self.folder / "never"])
         self.assert_all_refused((

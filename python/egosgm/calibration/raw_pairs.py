@@ -124,6 +124,9 @@ class _Video(_Source):
         if int(cv2.__version__.split(".")[0]) >= 5 and _is_bottom_up(file):  # its FFmpeg writes beyond such a picture's end
             raise _refuse(f"{file}: is an AVI of pixels that are not compressed, the last row first, on which OpenCV {cv2.__version__} would crash: "
                           f"`ffmpeg -i {file} -c:v ffv1 {pathlib.Path(file).stem}.mkv` makes one that loses nothing, and opencv-python-headless<5 reads this one")
+        kind = "" if _egosgm._is_video(file) else _egosgm._foreign_kind(file)
+        if kind:  # some of which OpenCV opens as videos, and converts without a word
+            raise _refuse(f"{file}: {kind}")
         self._file = file
         # By FFmpeg alone where OpenCV has it: other readers, which it would try next, print.
         has_ffmpeg = cv2.CAP_FFMPEG in cv2.videoio_registry.getStreamBackends()
