@@ -23,6 +23,7 @@ constexpr double kMinFocal = 0.15, kMaxFocal = 30;  // of the width
 // Of the sides, from the middle: 35 real sequences lie within 0.1. One that is scaled by itself moves both coordinates.
 constexpr double kMaxOffMiddle = 0.2, kMaxOffBoth = 0.1;
 constexpr double kMaxStretch = 1.15;  // of one focal length by the other, where the principal point is off, too
+constexpr int kFewPixels = 16;        // a principal point that is nearer to the first pixel is in another unit
 constexpr double kMinDensity = 0.5;
 constexpr double kFarRows_px = 0.9 * EGOSGM_MAX_OFFSET_PX;
 constexpr std::size_t kFramesPerLook = 50;  // for what is nearer than the range
@@ -81,7 +82,11 @@ std::optional<Suspicion> suspect_baseline(double baseline_m, double fx) {
                                           "it is %.4g m?",
                                           baseline_m * fx)
                                     : "";
-    return Suspicion{what, "no two cameras stand so close: give the distance of these in metres." + missing};
+    const std::string counted =
+        is_usual(1000 * baseline_m)
+            ? formatted(" Middlebury's is in millimetres: is this one in metres there, %.4g m?", 1000 * baseline_m)
+            : "";
+    return Suspicion{what, "no two cameras stand so close: give the distance of these in metres." + missing + counted};
   }
   return std::nullopt;
 }
@@ -93,6 +98,13 @@ std::optional<Suspicion> suspect_calibration(const Calibration& c, Size size) {
       "give the calibration of images of this size: scale fx, fy, cx, cy as the images were scaled, and subtract what "
       "was cropped from cx, cy";
   const std::string of_size = formatted("%dx%d", size.width, size.height);
+  if (std::max(c.cx, c.cy) < kFewPixels && std::min(c.cx, c.cy) > 0 &&
+      std::min(size.width, size.height) > 4 * kFewPixels) {
+    return Suspicion{formatted("fx %.4g, cx %.4g and cy %.4g are no pixels of images of ", c.fx, c.cx, c.cy) + of_size,
+                     std::max(c.cx, c.cy) <= 1
+                         ? "are they shares of the sides? Multiply fx and cx by the width, fy and cy by the height"
+                         : "are they millimetres? Divide them by the side of a pixel in millimetres"};
+  }
   const double x = (c.cx + 0.5) / size.width, y = (c.cy + 0.5) / size.height;  // the first pixel's middle is 0
   const bool is_off = !is_within(x, kMaxOffBoth) && !is_within(y, kMaxOffBoth);
   if (is_off && is_within((c.cx + 0.5) / size.height, kMaxOffBoth / 2) &&

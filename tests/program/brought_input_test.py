@@ -46,7 +46,7 @@ class Doubts(Brought):
     def test_units_of_a_baseline(self):
         f, _, _, baseline = self.calibration()
         for value, verdict, named in ((100 * baseline, "problem", "centimetres (0.54 m)"), (1000 * baseline, "problem", "millimetres (0.54 m)"),
-                                      (baseline / f, "problem", "is fx missing, so that it is 0.54 m?"), (3, "note", "decimetres (0.3 m)")):  # that may be right
+                                      (baseline / f, "problem", "is fx missing, so that it is 0.54 m?"), (baseline / 1000, "problem", "is this one in metres there, 0.54 m?"), (3, "note", "decimetres (0.3 m)")):  # that may be right
             arguments = self.patterns(calib=self.calibrated(baseline_m=value))
             with self.subTest(named):
                 self.assertIn(named, self.assert_works("run", *arguments, "--out", self.new_folder() / "out"))
@@ -66,10 +66,12 @@ class Doubts(Brought):
     def test_a_principal_point_and_a_focal_length_of_other_images(self):
         f, cx, cy, _ = self.calibration()
         for changes, named in ((dict(cx=cx / 4, cy=cy / 4), "principal point"), (dict(fx=f / 40, fy=f / 40), "focal lengths"),
+                               (dict(fx=0.58, fy=1.9, cx=0.5, cy=0.5), "shares of the sides"), (dict(fx=4, fy=4, cx=3, cy=1.1), "are they millimetres"),
                                (dict(doffs_px=cx), "the right principal point"), (dict(cx=HEIGHT / 2, cy=WIDTH / 2), "are turned by 90 degrees, or cx and cy are exchanged")):
             arguments = self.patterns(calib=self.calibrated(**changes))
             self.assertIn(named, self.assert_works("run", *arguments, "--out", self.new_folder() / "out"))
-            self.assertIn(named, self.assert_only_problem("calibration", *arguments)["text"])
+            finding = self.assert_only_problem("calibration", *arguments)
+            self.assertIn(named, finding["text"] + finding["remedy"])
 
     def test_calibrations_of_images_of_other_sizes(self):
         """By the size that the file says, else by the principal point."""

@@ -249,6 +249,9 @@ class Doctor(InputTest):
         turned = self.raw_rig("turned.json", R=rotation((1, 0, 0), 1).tolist())  # which these cameras are not
         finding = self.assert_only_problem("rows", *patterns, "--calib", turned)
         self.assertGreater(abs(float(finding["text"].split()[2])), 2)
+        lens = [-0.3, 0.1, 0.05, 0.08]  # of another order
+        finding = self.examine(*patterns, "--calib", self.raw_rig("lens.json", D1=lens, D2=lens), code=2)["calibration"]
+        self.assertIn("in the order k1, k2, p1, p2", finding["remedy"])
         self.assertIn("rectified here by", self.examine(*patterns, "--calib", turned, code=2)["images"]["text"])
 
     def test_a_calibration_may_be_a_file_for_each_camera(self):

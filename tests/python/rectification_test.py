@@ -123,7 +123,7 @@ def test_what_no_rig_has_is_named():
                            ({"right_matrix": np.zeros((3, 3))}, "M2 is no camera matrix"),
                            ({"left_matrix": projection()[:, :3].T}, "M1 is no camera matrix"), ({"left_matrix": projection(fx=-150)[:, :3]}, "M1 is no camera matrix"),
                            ({"right_matrix": np.diag([1.25, 1.25, 1]) @ turned().left_matrix}, "M1 and M2 are of images of two sizes: .* 1.25 times"),
-                           ({"right_matrix": np.diag([0.5, 0.5, 1]) @ turned().left_matrix}, "two sizes: .* 2 times"), ({"R": np.diag([1, 1, -1])}, "R is no rotation"), ({"R": 2 * np.eye(3)}, "R is no rotation"),
+                           ({"right_matrix": np.diag([0.5, 0.5, 1]) @ turned().left_matrix}, "two sizes: .* 2 times"), ({"R": np.diag([1, 1, -1])}, "R is no rotation"), ({"R": 2 * np.eye(3)}, "R is no rotation"), ({"R": np.diag([-1, -1, 1])}, "R turns by 180 degrees.*is it a vector in degrees"),
                            ({"given": (2 * np.eye(3), np.eye(3), np.eye(3, 4), np.eye(3, 4))}, "R1 is no rotation"),
                            ({"given": (np.eye(3),) * 3}, "belong together"),
                            *(({"given": (np.eye(3), np.eye(3), projection(), projection(**{name: value}))}, "P1 and P2 have different")

@@ -171,6 +171,8 @@ def rotation(value: Any) -> Optional[Matrix]:
     if vector is None:
         return matrix(value, (3, 3))
     angle = float(np.linalg.norm(vector))
+    if angle > np.pi:
+        raise _egosgm.InvalidArgument(f"R is a vector of the length {angle:.4g}, more than half a turn in radians: is it in degrees? Give radians, or a matrix")
     x, y, z = vector / (angle or 1.0)
     k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k

@@ -14,7 +14,7 @@ import numpy as np
 from .. import _egosgm
 from . import formats, named_values, parts
 from .formats import Found
-from .rectification import StereoRig, expect_side_by_side
+from .rectification import StereoRig, check_rig
 
 _Path = Union[str, "os.PathLike[str]"]
 _Reader = TypeVar("_Reader", bound=Callable[..., Any])
@@ -25,10 +25,13 @@ def _with_words(reader: _Reader) -> _Reader:
     @functools.wraps(reader)
     def read(file: Any, *arguments: Any, **options: Any) -> Any:
         try:
+            names = [os.fspath(part) for part in ([file] if isinstance(file, (str, os.PathLike)) else file)]
+        except TypeError:
+            raise _egosgm.InvalidArgument(f"{file!r:.60}: give the name of a calibration's file, or one for each camera") from None
+        try:
             with np.errstate(all="ignore"):  # what comes of it is refused
                 return reader(file, *arguments, **options)
         except _egosgm.InvalidArgument as error:  # of a value, perhaps
-            names = [os.fspath(part) for part in ([file] if isinstance(file, (str, os.PathLike)) else file)]
             if any(name in str(error) for name in names):
                 raise
             raise type(error)(f"{' and '.join(names)}: {error}") from None
@@ -36,7 +39,7 @@ def _with_words(reader: _Reader) -> _Reader:
             raise
         except Exception as error:
             reason = str(error).partition("\n")[0] or type(error).__name__
-            raise _egosgm.InvalidArgument(f"{file}: is a calibration with a part that cannot be read ({reason}): was it edited or cut?") from error
+            raise _egosgm.InvalidArgument(f"{' and '.join(names)}: is a calibration with a part that cannot be read ({reason}): was it edited or cut?") from error
     return read  # type: ignore[return-value]
 
 
@@ -125,7 +128,7 @@ def _of_folder(folder: pathlib.Path, is_fisheye: bool, size: Optional[Tuple[int,
             return found
     arrays = [file for file in sorted(folder.glob("*.npy")) if file.is_file()]  # NumPy would wait for a pipe
     if arrays:
-        return named_values.by_names({file.stem: np.load(file, allow_pickle=False) for file in arrays}, folder, "a folder of .npy", is_fisheye, size)
+        return named_values.by_names({file.stem: _array(file) for file in arrays}, folder, "a folder of .npy", is_fisheye, size)
     candidates = [file for file in sorted(folder.iterdir()) if file.suffix.lower() in (".yaml", ".yml", ".json", ".xml", ".txt", ".npz")]
     lefts = [file for file in candidates if re.search("left|cam0|_l[.]", file.name, re.IGNORECASE)]
     if len(lefts) == 1:
@@ -135,12 +138,19 @@ def _of_folder(folder: pathlib.Path, is_fisheye: bool, size: Optional[Tuple[int,
     raise parts.refuse(folder, "is a folder without one calibration: give the file" + (", of " + ", ".join(c.name for c in candidates[:8]) if candidates else ""))
 
 
+def _array(file: pathlib.Path) -> Any:
+    """Mapped: where the file says more numbers than it holds, none are allocated."""
+    return np.load(file, mmap_mode="r", allow_pickle=False)
+
+
 def _arrays(file: pathlib.Path) -> Dict[str, Any]:
     try:
         with np.load(file, allow_pickle=False) as archive:
             if sum(part.file_size for part in archive.zip.infolist()) > parts.MOST_BYTES:
                 raise parts.refuse(file, f"holds more than {parts.MOST_BYTES >> 20} MiB of arrays: give a calibration alone")
             return {name: archive[name] for name in archive.files}
+    except _egosgm.InvalidArgument:
+        raise
     except (ValueError, OSError, zipfile.BadZipFile) as error:
         raise parts.refuse(file, f"is no archive of NumPy arrays: {error}") from None
 
@@ -161,7 +171,7 @@ def _found(file: pathlib.Path, is_fisheye: bool, size: Optional[Tuple[int, int]]
     if start.startswith(b"PK"):
         return named_values.by_names(_arrays(file), file, "an archive of NumPy arrays", is_fisheye, size)
     if start.startswith(b"\x93NUMPY"):
-        array = np.load(file, allow_pickle=False)
+        array = _array(file)
         if array.shape == (4, 4):
             return named_values.of_q(array.astype(float), file)
         raise parts.refuse(file, f"is one NumPy array of the shape {array.shape}: give the folder that holds all of them, or Q")
@@ -256,10 +266,7 @@ def find(file: "_Path | Sequence[_Path]", unit_m: Optional[float] = None, is_fis
         if warning and warning.is_certain:
             raise parts.refuse(path, f"T gives {warning.what}: {warning.remedy} Give --unit cm or --unit mm (unit_m 0.01 or 0.001), whichever it is; the side of a square in metres where T "
                                 "counts a board's squares (--unit 0.025, unit_m 0.025); or --unit m (unit_m 1) where it is right")
-    try:
-        expect_side_by_side(np.ravel(found.T))
-    except _egosgm.InvalidArgument as error:
-        raise parts.refuse(path, str(error)) from None
+    check_rig(found)
     calibration = _without_rectification(found)
     if calibration is not None:
         parts.expect_size(found.size, size, path)

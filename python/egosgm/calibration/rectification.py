@@ -16,6 +16,7 @@ _LEAST_DISTANCE_M = 1e-6
 _MOST_ROTATION_ERROR = 1e-2  # files round to a few digits
 _MOST_FOCAL_DIFFERENCE, _MOST_ROWS_PX = 1e-3, 1e-2  # of P1 and P2, which round to a few digits, too
 _MOST_SIDE = 16384
+_MOST_TURN_DEG = 45.0
 _LEAST_SCALE, _MOST_SCALE_ERROR = 1.15, 0.1  # of a camera matrix of images of another size: its centre and its focal length are scaled alike
 
 
@@ -106,13 +107,18 @@ def expect_side_by_side(translation: _Matrix) -> None:
                                       "(unit_m 0.001)")
 
 
-def _check(rig: Any) -> None:
+def check_rig(rig: Any) -> None:
+    """Throws InvalidArgument where no two cameras that stand side by side have these numbers."""
     for side, name in enumerate(("left", "right"), 1):
         _check_shape(f"M{side}", getattr(rig, f"{name}_matrix"), 3, 3)
         _check_distortion(f"D{side}", getattr(rig, f"{name}_distortion"), rig.is_fisheye)
     _check_shape("R", rig.R, 3, 3)
     _check_shape("T", rig.T, 3, 1)
     _check_rotation("R", rig.R)
+    turn_deg = math.degrees(math.acos(min(1.0, max(-1.0, (np.trace(rig.R) - 1) / 2))))
+    if turn_deg > _MOST_TURN_DEG:
+        raise _egosgm.InvalidArgument(f"R turns by {turn_deg:.0f} degrees, and cameras side by side look the same way: is it a vector in degrees, which OpenCV has in radians? "
+                                      "Of a camera that is mounted upside down, turn the images, and calibrate them so")
     with np.errstate(all="ignore"):
         _check_size(rig.left_matrix, rig.right_matrix)
     for name, matrix in zip(("R1", "R2", "P1", "P2"), rig.given or ()):
@@ -178,7 +184,7 @@ class Rectification:
             raise _egosgm.InvalidArgument(f"alpha {alpha:.4g}: choose from 0 to 1")
         if rig.size is not None and rig.size != (width, height):
             raise _egosgm.InvalidArgument(f"the images are {width}x{height}, but {rig.size[0]}x{rig.size[1]} were calibrated: give the calibration of this size")
-        _check(rig)
+        check_rig(rig)
         size = (width, height)
         left_r, right_r, left_p, right_p = projections(rig, size, alpha)
         self.calibration = _egosgm.Calibration(left_p[0, 0], left_p[1, 1], left_p[0, 2], left_p[1, 2], -right_p[0, 3] / right_p[0, 0],

@@ -24,6 +24,9 @@ _MOST_OF_STREAM = 300  # frames of a bag or a video, which is read from its star
 _EXCHANGE = ("the calibration's right camera stands left of its left one: exchange the two cameras' rows, and where the images are swapped, too, exchange "
              "them as well; or its transformation is the inverse of the one that is meant")
 
+_OTHER_CAMERAS = ("so come the images out of its matrices, R and distortion: are they of these cameras and of this size, R in radians, and the distortion in the order k1, k2, "
+                  "p1, p2? `egosgm calibrate` finds them anew")
+
 
 class _Pair(NamedTuple):
     place: int
@@ -238,7 +241,10 @@ def _examine(source: _Source, samples: int, least: int, end: int) -> List[Findin
         findings.append(Finding("problem", "files", f"frame {broken[0][0]} cannot be read: {broken[0][1]}", "`run` leaves such a pair out: save it again"))
     of_pairs = examination.findings(count)
     if source.rectified:
-        of_pairs[0] = of_pairs[0]._replace(text=f"{of_pairs[0].text}, rectified here by {source.rectified}")
+        images, calibration, *rest = of_pairs
+        if calibration.verdict != "ok" and source.calibration and not _egosgm._suspect_baseline(source.calibration.baseline_m, source.calibration.fx):
+            calibration = calibration._replace(remedy=_OTHER_CAMERAS)
+        of_pairs = [images._replace(text=f"{images.text}, rectified here by {source.rectified}"), calibration, *rest]
     moments = _moments(pairs, places) if of_pairs[0].verdict != "problem" else []
     if any(finding.verdict == "problem" for finding in moments) or source.is_of_other_moments():  # which explains what rows, sides and range would say
         of_pairs = [finding for finding in of_pairs if finding.check in ("images", "calibration")]
