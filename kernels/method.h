@@ -13,6 +13,9 @@
 #define EGOSGM_COARSE_MIN_COUNT 8
 // So many of the least and of the largest of these are taken for mismatches. REQUIRES: less than half of the count.
 #define EGOSGM_COARSE_OUTLIERS 2
+// Where these are of one surface, as they span no more than one of their pixels, it may lie so much farther [px]:
+// beside an outline, nearer surfaces draw the disparities of a small image.
+#define EGOSGM_COARSE_FARTHER_PX 3.0f
 // A block is of a thin thing where it holds predictions by so much nearer than the blocks EGOSGM_THIN_BLOCKS to the
 // left and to the right do [px]. So many blocks above and below it, that thing may go on; every second one is asked.
 #define EGOSGM_THIN_JUMP_PX 3.0f

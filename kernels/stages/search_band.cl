@@ -55,7 +55,7 @@ KERNEL void gather_blocks(const ImageSize size, const RowSteps row_steps, global
 
 // Spans what CoarseMatch found in a block and one coarse pixel around it, in full pixels, without
 // EGOSGM_COARSE_OUTLIERS at either end: a single mismatch, as where there is no texture, would widen the bands of a
-// whole block. A work-item a block and view.
+// whole block. One surface may lie a little farther. A work-item a block and view.
 COMPILED_ONCE void gather_coarse_block(const WorkItem at, const ImageSize size, global const float* coarse,
                                        global BlockRange* ranges) {
   const ImageSize blocks = blocks_of(size);
@@ -101,6 +101,7 @@ COMPILED_ONCE void gather_coarse_block(const WorkItem at, const ImageSize size, 
   BlockRange range;
   range.min = EGOSGM_COARSE * least[EGOSGM_COARSE_OUTLIERS].x;
   range.max = EGOSGM_COARSE * most[EGOSGM_COARSE_OUTLIERS].x;
+  if (range.max - range.min <= (float)EGOSGM_COARSE) range.min -= EGOSGM_COARSE_FARTHER_PX;
   range.count = count.x + count.y + count.z + count.w;
   ranges[index_of(blocks, view, x, y)] = range;
 }

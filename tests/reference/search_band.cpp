@@ -56,7 +56,8 @@ std::pair<float, float> found_around(shared::ImageSize size, const std::vector<f
   }
   if (found.size() < kCoarseMinCount) return {kInfinity, -kInfinity};
   std::sort(found.begin(), found.end());
-  return {found[kCoarseOutliers], found[found.size() - 1 - kCoarseOutliers]};
+  const float least = found[kCoarseOutliers], most = found[found.size() - 1 - kCoarseOutliers];
+  return {most - least <= 4 ? least - kCoarseFartherPx : least, most};
 }
 
 /// Disparities of both views, of the rows that are there.

@@ -197,6 +197,14 @@ TEST(SearchBand, ReachesWhatTheCoarseMatchFoundElsewhere) {
   EXPECT_EQ(run(size, {0, 128}, options, maps, 0, coarse).bands[20 * 64 + 20].last, 42);
   for (float& d : coarse) d = d > 0 ? 11.3f : d;
   EXPECT_EQ(run(size, {0, 128}, options, maps, 0, coarse).bands[20 * 64 + 20].last, 48);
+
+  const auto first = [&] { return run(size, {0, 128}, options, maps, 0, coarse).bands[20 * 64 + 20].first; };
+  for (float& d : coarse) d = d > 0 ? 9.5f : d;  // 38: with 3 px farther, within 3 px of what is searched anyway
+  EXPECT_EQ(first(), 38);
+  for (float& d : coarse) d = d > 0 ? 9.25f : d;
+  EXPECT_EQ(first(), 32) << "37, 3 px farther, and the margin";
+  for (int u = 3; u <= 5; ++u) coarse[3 * 16 + u] = 10.5f;
+  EXPECT_EQ(first(), 38) << "37 and 42 are two surfaces";
 }
 
 // Beside a jump a prediction may lie on the wrong side of it.
