@@ -6,29 +6,29 @@
 namespace egosgm {
 namespace {
 
-struct Comparisons {
-  int kind, radius_x, radius_y;
+/// Half of the window that is compared with a pixel; 0: its grey value is taken.
+struct Radius {
+  int x, y;
 };
 
-Comparisons comparisons(MatchingCost cost) {
+Radius radius(MatchingCost cost) {
   switch (cost) {
     case MatchingCost::kSad3x3:
-      return {0, 0, 0};
+      return {0, 0};
     case MatchingCost::kCensus5x5:
-      return {1, 2, 2};
+      return {2, 2};
     case MatchingCost::kCensus9x7:
-      return {1, 4, 3};
+      return {4, 3};
   }
   return {};
 }
 
 ocl::Defines defines(PixelType type, MatchingCost cost, int words) {
-  const Comparisons chosen = comparisons(cost);
+  const auto [radius_x, radius_y] = radius(cost);
   return pixel_define(type)
       .set("CODE_BYTES", 4 * std::max(words, Census::words(cost)))
-      .set("COMPARISONS", chosen.kind)
-      .set("RADIUS_X", chosen.radius_x)
-      .set("RADIUS_Y", chosen.radius_y);
+      .set("RADIUS_X", radius_x)
+      .set("RADIUS_Y", radius_y);
 }
 
 }  // namespace

@@ -6,7 +6,7 @@
 
 #include "code_bytes.h"
 
-#define HAS_ALIKE (COMPARISONS == 1 && PIXEL_BYTES == 2 && COUNT == 62)
+#define HAS_ALIKE (PIXEL_BYTES == 2 && COUNT == 62)
 #if HAS_ALIKE
 // Pixels side by side on a surface differ by its texture and by noise, and most of the eight around a pixel lie on its
 // surface. So its tolerance follows from the fourth least difference to these. `least`: the four least, in order.

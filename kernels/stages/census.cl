@@ -14,24 +14,21 @@
 #include "grey.h"
 #include "method.h"
 
-// lint: PIXEL_BYTES=1 CODE_BYTES=8 COMPARISONS=1 RADIUS_X=4 RADIUS_Y=3 PIXELS=16
-// lint: PIXEL_BYTES=1 CODE_BYTES=4 COMPARISONS=1 RADIUS_X=2 RADIUS_Y=2 PIXELS=1
-// lint: PIXEL_BYTES=2 CODE_BYTES=8 COMPARISONS=1 RADIUS_X=4 RADIUS_Y=3 PIXELS=16
-// lint: PIXEL_BYTES=1 CODE_BYTES=4 COMPARISONS=0 RADIUS_X=1 RADIUS_Y=1 PIXELS=1
-// lint: PIXEL_BYTES=2 CODE_BYTES=8 COMPARISONS=1 RADIUS_X=4 RADIUS_Y=3 PIXELS=1
-// lint: PIXEL_BYTES=2 CODE_BYTES=4 COMPARISONS=1 RADIUS_X=2 RADIUS_Y=2 PIXELS=16
-// lint: PIXEL_BYTES=2 CODE_BYTES=8 COMPARISONS=1 RADIUS_X=2 RADIUS_Y=2 PIXELS=16
-// lint: PIXEL_BYTES=2 CODE_BYTES=8 COMPARISONS=1 RADIUS_X=2 RADIUS_Y=2 PIXELS=1
-// lint: PIXEL_BYTES=2 CODE_BYTES=4 COMPARISONS=0 RADIUS_X=1 RADIUS_Y=1 PIXELS=16
+// lint: PIXEL_BYTES=1 CODE_BYTES=8 RADIUS_X=4 RADIUS_Y=3 PIXELS=16
+// lint: PIXEL_BYTES=1 CODE_BYTES=4 RADIUS_X=2 RADIUS_Y=2 PIXELS=1
+// lint: PIXEL_BYTES=2 CODE_BYTES=8 RADIUS_X=4 RADIUS_Y=3 PIXELS=16
+// lint: PIXEL_BYTES=1 CODE_BYTES=4 RADIUS_X=0 RADIUS_Y=0 PIXELS=1
+// lint: PIXEL_BYTES=2 CODE_BYTES=8 RADIUS_X=4 RADIUS_Y=3 PIXELS=1
+// lint: PIXEL_BYTES=2 CODE_BYTES=4 RADIUS_X=2 RADIUS_Y=2 PIXELS=16
+// lint: PIXEL_BYTES=2 CODE_BYTES=8 RADIUS_X=2 RADIUS_Y=2 PIXELS=16
+// lint: PIXEL_BYTES=2 CODE_BYTES=8 RADIUS_X=2 RADIUS_Y=2 PIXELS=1
+// lint: PIXEL_BYTES=2 CODE_BYTES=4 RADIUS_X=0 RADIUS_Y=0 PIXELS=16
 
 #ifndef PIXELS
 #error "PIXELS: of a work-item, 1 or 16"
 #endif
-#ifndef COMPARISONS
-#error "COMPARISONS: 0 for the grey value, 1 for a census window"
-#endif
 #ifndef RADIUS_X
-#error "RADIUS_X: half the window's width"
+#error "RADIUS_X: half the window's width; 0 for the grey value"
 #endif
 #ifndef RADIUS_Y
 #error "RADIUS_Y: half the window's height"
@@ -71,7 +68,7 @@ static inline Code code_at(const int width, const Rows* rows, const int x, const
 #if HAS_ALIKE
   if (alike) return alike_at(width, rows, x);
 #endif
-#if COMPARISONS == 0
+#if RADIUS_X == 0
   return to_8_bit(AT(0, 0));
 #else
   Code code = 0;
@@ -100,7 +97,7 @@ KERNEL void census(const ImageSize size, const RowSteps row_steps, const int pad
 
 #else
 
-#if COMPARISONS == 0
+#if RADIUS_X == 0
 
 #define CODES_AT_ONCE 16
 static inline void write_codes_at(const Rows* rows, const int x, const int width, const int view, global Code* row) {

@@ -26,7 +26,7 @@ static inline void write_codes(const Codes codes, const int x, const int width, 
   }
 }
 
-#if COMPARISONS > 0
+#if RADIUS_X > 0
 
 // A block of 8-bit pixels at once, or 16 of 16 bits.
 #if PIXEL_BYTES == 1
