@@ -142,6 +142,8 @@ def test_a_size_is_a_width_and_a_height(tmp_path):
 
 def test_two_files_of_ros_and_of_kimera(tmp_path):
     expect_refused("is the calibration of one camera", lambda: read(tmp_path, "left.yaml", ros(P)))
+    (tmp_path / "right.yaml").write_text(ros(RIGHT_P).replace(str(WIDTH), "1280"))
+    expect_refused("left.yaml.*of two resolutions, 640x480 and 1280x480", lambda: read(tmp_path, "left.yaml", ros(P)))
     (tmp_path / "right.yaml").write_text(ros(RIGHT_P))
     for given in ("left.yaml", "right.yaml", "."):
         expect_rectified(egosgm.read_calibration(tmp_path / given))
@@ -180,6 +182,7 @@ def test_a_file_for_each_camera_of_any_name(tmp_path):
         egosgm.read_calibration((tmp_path / "a.yaml", tmp_path / "b.yaml"))
     expect_refused("one file, or one for each camera", lambda: egosgm.read_calibration([tmp_path / "a.yaml"] * 3))
     (tmp_path / "c.yaml").write_text("a: 1\n")
+    expect_refused("a.yaml: is given for both cameras", lambda: egosgm.read_calibration((tmp_path / "a.yaml", tmp_path / "a.yaml")))
     expect_refused("c.yaml: is not the calibration of one camera", lambda: egosgm.read_calibration((tmp_path / "a.yaml", tmp_path / "c.yaml")))
 
 
@@ -217,6 +220,7 @@ def test_cameras_of_rovers(tmp_path):
 
     expect_rectified(read_both(cahv(place, turn), cahv(place + B * turn[0], turn)))
     expect_rectified(egosgm.read_calibration((tmp_path / "left.cahv", tmp_path / "right.cahv")))
+    expect_refused("of two resolutions, 640x480 and 1280x960", lambda: read_both(cahv(place, turn), cahv(place, turn).replace(f"{WIDTH} {HEIGHT}", "1280 960")))
     toed_in = np.array([[0.0, np.cos(0.01), np.sin(0.01)], [0, -np.sin(0.01), np.cos(0.01)], [1, 0, 0]])
     rig = read_both(cahv(place, turn), cahv(place + B * turn[0], toed_in))
     np.testing.assert_allclose(rig.R, toed_in @ turn.T, atol=1e-12)
@@ -333,6 +337,9 @@ def test_a_fisheye(tmp_path):
     for name, text in {"radtan.yaml": kalibr(LENS), "own.txt": RECTIFIED["own.txt"], "q.yml": RECTIFIED["q.yml"]}.items():
         expect_refused(f"{name}: is of rectified images, or says itself what its lenses are", lambda: read(tmp_path, name, text, is_fisheye=True))
     oak = json.loads(RAW["oak.json"])
+    oak["cameraData"][1][1]["width"] = 2 * WIDTH
+    expect_refused("of two resolutions, 640x480 and 1280x480", lambda: read(tmp_path, "oak.json", json.dumps(oak)))
+    oak["cameraData"][1][1]["width"] = WIDTH
     for kind in (1, 2):  # as DepthAI numbers its models of lenses
         for _, camera in oak["cameraData"][:2]:
             camera["cameraType"] = kind

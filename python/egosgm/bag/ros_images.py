@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from .. import _egosgm
 from ..geometry.depth import depth_sigma_from_disparity
+from ..calibration.parts import expect_one_size
 from ..calibration.rectification import Rectification, StereoRig
 
 # Bytes between neighbouring pixels of an encoding, and where the brightness lies in them, or red, green and blue.
@@ -175,6 +176,7 @@ class Cameras:
         if abs(left_p[0, 0] - right_p[0, 0]) > 1e-3 * left_p[0, 0] or abs(left_p[1, 2] - right_p[1, 2]) > 1e-2:
             raise _egosgm.InvalidArgument("camera info: P of both cameras have different focal lengths or rows: they are not of one rectified pair")
         self.size = _size(left)
+        expect_one_size(self.size, _size(right), lambda text: _egosgm.InvalidArgument(f"camera info: is{text}"))
         self.rig: Optional[StereoRig] = None
         self._rectification: Optional[Rectification] = None
         if rectify:

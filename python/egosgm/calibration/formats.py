@@ -9,7 +9,7 @@ from typing import Any, Dict, List, Optional, Tuple, Union
 import numpy as np
 
 from .. import _egosgm
-from .parts import Camera, Matrix, Values, data_of, expect_size, matrix, of_four, one_resolution, refuse, rotation, size_of, text_of, transform
+from .parts import Camera, Matrix, Values, data_of, expect_one_size, expect_size, matrix, of_four, one_resolution, refuse, rotation, size_of, text_of, transform
 from .rectification import StereoRig
 
 Found = Union[StereoRig, _egosgm.Calibration]
@@ -190,7 +190,8 @@ def oak(data: Dict[str, Any], file: pathlib.Path, images_size: Optional[Tuple[in
     kinds = [camera.data.get("cameraType", 0) for camera in both]
     if not set(kinds) <= {0, 1}:  # perspective and fisheye
         raise calibration.refuse(f" of the lenses cameraType {kinds[0]} and {kinds[1]}: 0 and 1 are read")
-    calibrated = size_of([both[0].data.get("width"), both[0].data.get("height")])
+    calibrated, other = (size_of([camera.data.get("width"), camera.data.get("height")]) for camera in both)
+    expect_one_size(calibrated, other, calibration.refuse)
     stream = _stream_from(calibrated, images_size)
     cameras = [((np.eye(3) if stream is None else stream) @ camera.matrix((3, 3), "intrinsicMatrix"), camera.matrix((), "distortionCoeff")[:4 if kind else 14], bool(kind))
                for camera, kind in zip(both, kinds)]
@@ -277,5 +278,7 @@ def _cahv(text: str, file: pathlib.Path) -> Tuple[Camera, Matrix, Optional[Tuple
 
 def cahv(files: List[pathlib.Path], texts: List[str]) -> StereoRig:
     """Two cameras of a rover."""
-    (left, rover_from_left, size), (right, rover_from_right, _) = (_cahv(text, file) for text, file in zip(texts, files))
-    return Values({}, files[0], "a rover's camera (CAHV)").pair_on_body([left, right], [rover_from_left, rover_from_right], size)
+    (left, rover_from_left, size), (right, rover_from_right, other_size) = (_cahv(text, file) for text, file in zip(texts, files))
+    rover = Values({}, files[0], "a rover's camera (CAHV)")
+    expect_one_size(size, other_size, rover.refuse)
+    return rover.pair_on_body([left, right], [rover_from_left, rover_from_right], size)

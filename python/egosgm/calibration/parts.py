@@ -9,7 +9,7 @@ import pathlib
 import re
 import xml.etree.ElementTree as ElementTree
 import zlib
-from typing import Any, Dict, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, Optional, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -145,12 +145,17 @@ class Values:
         return self.pair(cameras, np.linalg.inv(body_from[1]) @ body_from[0], size)
 
 
+def expect_one_size(left: Optional[Tuple[int, int]], right: Optional[Tuple[int, int]], refuse: Callable[[str], Exception]) -> None:
+    """Of both cameras' images, where both sizes are known."""
+    if left and right and 0 not in left + right and left != right:
+        raise refuse(" of two resolutions, {}x{} and {}x{}: give both cameras' of one".format(*left, *right))
+
+
 def one_resolution(*cameras: Values) -> Any:
     """Of all cameras: None where the first has none."""
     first, *others = (camera.resolution() for camera in cameras)
     for camera, other in zip(cameras[1:], others):
-        if None not in (size_of(first), size_of(other)) and size_of(first) != size_of(other):
-            raise camera.refuse(" of two resolutions, {}x{} and {}x{}: give both cameras' of one".format(*size_of(first), *size_of(other)))  # type: ignore[misc]
+        expect_one_size(size_of(first), size_of(other), camera.refuse)
     return first
 
 

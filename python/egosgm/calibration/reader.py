@@ -249,6 +249,8 @@ def find(file: "_Path | Sequence[_Path]", unit_m: Optional[float] = None, is_fis
     files = [pathlib.Path(part) for part in ([file] if isinstance(file, (str, os.PathLike)) else file)]
     if not 1 <= len(files) <= 2:
         raise _egosgm.InvalidArgument(f"a calibration is one file, or one for each camera, left and right, not {len(files)}")
+    if len(files) == 2 and files[0].exists() and files[1].exists() and files[0].samefile(files[1]):
+        raise parts.refuse(files[0], "is given for both cameras: give the file of each")
     path, given, size = files[0], size, parts.size_of(size)
     if given is not None and size is None:
         raise _egosgm.InvalidArgument(f"size {given}: give (width, height)")
