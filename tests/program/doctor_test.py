@@ -108,6 +108,16 @@ class Doctor(InputTest):
                                            "--calib", self.street / "calib.txt")
         self.assertIn("swapped", finding["remedy"])
 
+    def test_a_camera_that_is_off_in_some_frames(self):
+        street = self.broken_street()
+        for i in (1, 2):
+            write_grey(street / f"image_1/{i:06d}.png", numpy.zeros((HEIGHT, WIDTH)))
+        for frames, looked_at in ((":2", 3), (":", 4)):
+            found = self.examine(street, *(["--frames", frames] if frames != ":" else []), code=2 if frames == ":2" else 0)
+            self.assertIn("of nearly one tone", found["images"]["text"])
+            self.assertNotIn("moments", found)
+        self.assertIn("in 2 of 4 pairs that were looked at", found["images"]["text"])
+
     def test_pairs_that_differ_from_each_other(self):
         swapped, loose = self.broken_street(), self.broken_street()
         for i, shift in enumerate((0, 4, -3, 2)):

@@ -185,7 +185,7 @@ def _moments(pairs: Dict[int, _Pair], places: Sequence[int]) -> List[Finding]:
     laters = [_steps(pairs, places, lag) for lag in range(1, _MOST_LATE + 1)]
     steps = laters[0]
     for this, other in (("left", "right"), ("right", "left")):
-        frozen = sum(np.array_equal(getattr(a, this), getattr(b, this)) and not np.array_equal(getattr(a, other), getattr(b, other)) for a, b in steps)
+        frozen = sum(np.ptp(getattr(b, this)) > 0 and np.array_equal(getattr(a, this), getattr(b, this)) and not np.array_equal(getattr(a, other), getattr(b, other)) for a, b in steps)
         if frozen:
             return [Finding("problem", "moments", f"the {this} image is that of the frame before in {frozen} of {len(steps)} steps that were looked at, and the {other} "
                             "one is not", "leave such pairs out: they are of other moments")]

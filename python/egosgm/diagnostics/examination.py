@@ -246,6 +246,9 @@ class Examination:
                            "convert both images to grey first, as cv2.cvtColor(image, cv2.COLOR_BayerBG2GRAY) does for one order of the colours")
         if 2 * self._interlaced > self._pairs:
             return Finding("problem", "images", f"{text}, interlaced: every other row is of another moment", "take every other row of both images, or deinterlace the videos")
+        dull = sum(contrast < _LEAST_CONTRAST for contrast in self._contrasts)
+        if dull:
+            return Finding("note", "images", f"{text}; in {dull} of {self._pairs} pairs that were looked at, an image is of nearly one tone", "leave these out: a camera was covered, dark or off")
         left, right = self._brightness / self._pairs
         ratio = (left + 1) / (right + 1)
         if max(ratio, 1 / ratio) > _MOST_BRIGHTNESS:
