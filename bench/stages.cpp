@@ -37,8 +37,8 @@ constexpr const char* kHelp =
 constexpr int kFramesARound = 5;
 /// Bytes that each stage must move in a steady frame that matches so many cells.
 std::map<std::string, double> bytes_of(shared::ImageSize size, double cells) {
-  const double pixels = static_cast<double>(pixel_count(size));  // of a view; a map of both has two times as many
-  const double map = 4 * pixels, maps = 2 * map, band = 12 * pixels, codes = 8 * pixels, grey = 2 * pixels;
+  const double pixels = static_cast<double>(pixel_count(size));  // of a view; maps of both have every second row
+  const double map = 4 * pixels, maps = 2 * map / 2, band = 12 * pixels, codes = 8 * pixels, grey = 2 * pixels;
   return {{"ForwardWarp", 4 * maps},
           {"HoleFill", 8 * maps},
           {"ConsistencyCheck", 3 * 2 * maps},
@@ -50,7 +50,7 @@ std::map<std::string, double> bytes_of(shared::ImageSize size, double cells) {
           {"StepPenalties", grey + 8 * pixels},
           {"BandedSgm", 2 * (2 * (codes + band) + maps + cells)},
           {"MedianFilter", 4 * maps},
-          {"RowInterpolation", 3 * maps},
+          {"RowInterpolation", 6 * map},
           {"SpeckleRemoval", 2 * map},
           // Both views' codes, prediction and measurement, those of a quarter, and what is given out of the left view.
           {"Evidence", codes * 17 / 16 + 2 * maps + 2 * map},

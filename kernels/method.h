@@ -22,9 +22,9 @@
 #define EGOSGM_THIN_BLOCKS 2
 #define EGOSGM_THIN_REACH 8
 
-// Rows above and below one that the right view lacks (stages/row_interpolation.cl) see one surface where their
-// disparities differ by no more than this.
-#define EGOSGM_ROWS_AGREE_PX 1.0f
+// Rows above and below one that is left out (stages/row_interpolation.cl) see one surface where their disparities
+// differ by no more than this.
+#define EGOSGM_ROWS_AGREE_PX 3.0f
 
 // A doubtful disparity is known to 4 px, so that the next frame searches wide: the least variance where measurement and
 // prediction contradict each other.

@@ -9,6 +9,7 @@
 
 #include "tests/reference/pipeline.h"
 #include "tests/reference/present_rows.h"
+#include "tests/reference/row_interpolation.h"
 #include "tests/support/compare.h"
 #include "tests/support/pipeline_video.h"
 #include "tests/support/stage_chain.h"
@@ -60,7 +61,7 @@ void expect_same(const reference::Pass& actual, const reference::Pass& expected,
   expect_same("matched", actual.matched, expected.matched, size, measured);
   expect_same("smoothed", actual.smoothed, expected.smoothed, size, measured);
   ASSERT_FALSE(actual.measured.disparity.empty());
-  expect_same("measured", actual.measured, expected.measured, size, {views.count, {1, views.row_steps.right}});
+  expect_same("measured", actual.measured, expected.measured, size, views);
 }
 
 void expect_same(const reference::Frame& actual, const reference::Frame& expected, const Setting& setting) {
@@ -98,8 +99,11 @@ std::vector<T> half(const std::vector<T>& both, int view) {
 
 void expect_outputs(const OutputMemory& outputs, const reference::Frame& expected, shared::ImageSize size) {
   const bool has_prediction = !expected.predicted.disparity.empty();
-  const HostMaps predicted = has_prediction ? expected.predicted : empty_maps(size);
+  const shared::RowSteps steps = expected.tracked_rows;
+  const HostMaps predicted =
+      reference::row_interpolation(size, steps, has_prediction ? expected.predicted : empty_maps(size));
   const reference::Pass& pass = expected.passes.back();
+  const HostMaps measured = reference::row_interpolation(size, steps, pass.measured);
   std::vector<std::uint16_t> widths;
   for (const shared::Band& band : half(pass.band.bands, 0)) {
     const std::size_t row = widths.size() / size.width;
@@ -115,8 +119,8 @@ void expect_outputs(const OutputMemory& outputs, const reference::Frame& expecte
   expect_map("right_variance", outputs.right_variance, half(expected.output_variance, 1));
   expect_map("predicted", outputs.predicted, half(predicted.disparity, 0));
   expect_map("predicted_variance", outputs.predicted_variance, half(masked(predicted).variance, 0));
-  expect_map("measured", outputs.measured, half(pass.measured.disparity, 0));
-  expect_map("measured_variance", outputs.measured_variance, half(masked(pass.measured).variance, 0));
+  expect_map("measured", outputs.measured, half(measured.disparity, 0));
+  expect_map("measured_variance", outputs.measured_variance, half(masked(measured).variance, 0));
   expect_map("search_width", outputs.search_width, widths);
   expect_map("dynamic", outputs.dynamic, expected.dynamic);
   expect_map("reason", outputs.reason, expected.reasons);
@@ -186,6 +190,31 @@ TEST_P(PipelineTest, EveryOutputOfAFrameEqualsItsReference) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Settings, PipelineTest, ::testing::ValuesIn(settings()), setting_name);
+
+// Rows that are left out are filled in what is asked for, and in what that is made of.
+TEST(Pipeline, AnOutputThatIsAskedForAloneHasTheSameBits) {
+  const Setting setting = standard();
+  const Video video(setting, 3);
+  Pipeline with_all = make_pipeline(setting);
+  const std::vector<OutputMemory> expected = process_all(with_all, setting, video);
+  for (const OutputText& asked : output_texts()) {
+    Pipeline pipeline = make_pipeline(setting);
+    for (int index = 0; index < video.size(); ++index) {
+      SCOPED_TRACE(asked.name + std::string(", frame ") + std::to_string(index));
+      OutputMemory memory(setting.size, setting.layout);
+      FrameOutputs outputs = memory.views();
+      for_each_output(outputs, [&](const OutputText& text, auto& view) {
+        if (text.output != asked.output) view = {};
+      });
+      const ImageMemory left = video.image(index, EGOSGM_LEFT), right = video.image(index, EGOSGM_RIGHT);
+      pipeline.process(left.view(), right.view(), video.motion(index), outputs);
+      OutputMemory::for_each_map([&](const char* name, auto map) {
+        if (name != std::string(asked.name)) return;
+        EXPECT_TRUE(same_bits((memory.*map).values(), (expected[index].*map).values(), setting.size));
+      });
+    }
+  }
+}
 
 // The scene has to reach every stage, or equality means nothing.
 TEST(PipelineScene, ReachesEveryStage) {

@@ -42,13 +42,13 @@ constexpr Unpredicted kFirstFrame = Unpredicted::kFirstFrame, kReset = Unpredict
 
 // All that decides, in all combinations; what a frame without `temporal` has from before does not matter.
 constexpr Case kCases[] = {
-    {true, kBand, false, {}, true, "- | bands | tracks left | matches left/2 x1 | coarse"},
+    {true, kBand, false, {}, true, "- | bands | tracks left/2 | matches left/2 x1 | coarse"},
     {true, kBand, false, {}, false, "no motion | everything | tracks left | matches left right x1 | coarse"},
     {true, kBand, false, kFirstFrame, true, "first frame | everything | tracks left | matches left right x1 | coarse"},
     {true, kBand, false, kFirstFrame, false, "first frame | everything | tracks left | matches left right x1 | coarse"},
     {true, kBand, false, kReset, true, "reset | everything | tracks left | matches left right x1 | coarse"},
     {true, kBand, false, kReset, false, "reset | everything | tracks left | matches left right x1 | coarse"},
-    {true, kBand, true, {}, true, "- | bands | tracks left right/2 | matches left/2 right/2 x1 | coarse"},
+    {true, kBand, true, {}, true, "- | bands | tracks left/2 right/2 | matches left/2 right/2 x1 | coarse"},
     {true, kBand, true, {}, false, "no motion | everything | tracks left right | matches left right x1 | coarse"},
     {true, kBand, true, kFirstFrame, true,
      "first frame | everything | tracks left right | matches left right x1 | coarse"},
@@ -106,7 +106,7 @@ TEST(Plan, MatchesTwiceWhereTheFirstMatchGivesTheVerticalOffset) {
 TEST(Plan, HasACoarseMatchOnlyWhereItIsOn) {
   MethodOptions options;
   options.coarse_match.enabled = false;
-  EXPECT_EQ(row(options, {}, true, true), "- | bands | tracks left right/2 | matches left/2 right/2 x1");
+  EXPECT_EQ(row(options, {}, true, true), "- | bands | tracks left/2 right/2 | matches left/2 right/2 x1");
 }
 
 TEST(Plan, MakesOnlyWhatIsWanted) {

@@ -34,15 +34,16 @@ void FuseStep::update(const Plan& plan, const Matched& matched, const Prediction
                         fusion.doubtful, after.evidence, plan.tracked);
   if (median_filter_) median_filter_->fill(fusion.fused, fusion.smoothed, belief.variance, plan.tracked);
   StereoMaps smoothed{median_filter_ ? fusion.smoothed : fusion.fused, belief.variance};
-  if (plan.tracked == Views::kLeft) right_map_->complete(measured, left_right_px_, smoothed, plan.wanted.has_right());
+  if (right_map_) {
+    right_map_->complete(measured, left_right_px_, smoothed, plan.wanted.has_right(), plan.tracked.row_steps);
+  }
   const Views checked = plan.wanted.has_right() ? plan.with_right() : plan.tracked;
   consistency_.check(smoothed.disparity, left_right_px_, outside_, belief.disparity, checked);
   if (sad_check_) (*sad_check_)[matched.images.type].check(matched.images.pixels, belief.disparity, checked);
 }
 
 void FuseStep::publish(const Plan& plan, const Belief& belief, Map& confirmed) {
-  evidence_->publish(belief.maps.disparity, belief.evidence, confirmed,
-                     plan.wanted.has_right() ? plan.with_right() : Views::kLeft, plan.tracked);
+  evidence_->publish(belief.maps.disparity, belief.evidence, confirmed, plan.published(), plan.tracked);
 }
 
 }  // namespace egosgm

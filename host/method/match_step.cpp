@@ -18,7 +18,6 @@ MatchStep::MatchStep(ocl::Context& context, shared::ImageSize size, const Method
       matcher_(context, size, range_of(options), options.banded_sgm,
                {path_group(tuning), {tuning.tile_width, tuning.tile_height, tuning.block_lanes}}),
       consistency_(context, size),
-      row_interpolation_(context, size),
       speckle_removal_(context, size, options.speckle_removal, tuning.speckle_strip_rows, tuning.row_group),
       removes_speckles_(options.speckle_removal.max_size_px > 0),
       judges_by_evidence_(Evidence::is_of(options)) {
@@ -40,8 +39,6 @@ void MatchStep::measure(const Plan& plan, const FrameImages& images, const Searc
   const Map& smoothed = median_filter_ ? matching.smoothed : matching.matched;
   consistency_.check(smoothed, reads_off ? left_right_.read_off_px : left_right_.measurement_px, OutsideView::kDrop,
                      measured.disparity, views);
-  row_interpolation_.interpolate(EGOSGM_LEFT, views.row_steps, measured.disparity, measured.variance);
-  if (reads_off) row_interpolation_.interpolate(EGOSGM_RIGHT, views.row_steps, measured.disparity, measured.variance);
   if (removes_speckles(plan)) speckle_removal_.remove(measured.disparity, plan.matched);
 }
 

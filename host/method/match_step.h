@@ -5,7 +5,6 @@
 #include "host/stages/consistency_check.h"
 #include "host/stages/matcher.h"
 #include "host/stages/median_filter.h"
-#include "host/stages/row_interpolation.h"
 #include "host/stages/speckle_removal.h"
 
 namespace egosgm {
@@ -46,7 +45,6 @@ class MatchStep {
   Matcher matcher_;
   std::optional<MedianFilter> median_filter_;
   ConsistencyCheck consistency_;
-  RowInterpolation row_interpolation_;
   SpeckleRemoval speckle_removal_;
   const bool removes_speckles_;    // of measurements that evidence does not judge
   const bool judges_by_evidence_;  // those with a prediction

@@ -24,7 +24,7 @@ FrameResults Method::frame(const Plan& plan, const FrameImages& uploaded, const 
   Map result = after.maps.disparity;
   in(Step::kPublish, [&] {
     result = confirmed(plan, after, output.disparity);
-    publish_.complete_right(plan, after.maps, measured, result);
+    publish_.complete_rows(plan, w.prediction, after.maps, measured, result);
     const Prediction* prediction = plan.predicts() ? &w.prediction : nullptr;
     publish_.write(plan,
                    {{images, match_.matcher().codes(), plan.grey_step, measured, match_.speckle_runs(plan)},

@@ -18,7 +18,7 @@ struct Plan {
   std::optional<Unpredicted> why_not;  // there is no prediction
   std::optional<Motion> motion;        // by which it is made
   Search search;
-  Views tracked;  // predicted and fused
+  Views tracked;  // predicted and fused; where bands are searched, in the rows that are matched
   Views matched;  // where it is the left one, the right one is read off its match
   bool fuses;     // a prediction, or nothing, with what is measured
   int matches;    // 2 where the first one gives the vertical offset
@@ -34,7 +34,9 @@ struct Plan {
     return wanted.has(Output::kReason) ? shared::RowSteps{1, 1} : matched.row_steps;
   }
   /// The views that are tracked, or both where the right one is made of the left one.
-  Views with_right() const { return tracked == Views::kLeft ? Views::kBoth : tracked; }
+  Views with_right() const { return {2, tracked.row_steps}; }
+  /// The views of which somebody wants maps.
+  Views published() const { return {wanted.has_right() ? 2 : 1, tracked.row_steps}; }
 };
 
 /// `why_no_belief`: why the belief has no maps, if it has none. `knows_offset`: whether it has a vertical offset.

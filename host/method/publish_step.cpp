@@ -35,13 +35,21 @@ void PublishStep::prepare(PixelType type, const Wanted& wanted) {
   if (wanted.has(Output::kDynamic) && build_dynamic_map_ && !dynamic_map_) dynamic_map_.emplace(build_dynamic_map_());
 }
 
-void PublishStep::complete_right(const Plan& plan, StereoMaps& belief, StereoMaps& measured, Map& result) {
-  if (!plan.wanted.has_right()) return;
-  const shared::RowSteps steps = plan.tracked.row_steps;
-  row_interpolation_.interpolate(EGOSGM_RIGHT, steps, result, belief.variance);
-  if (!plan.wanted.has(Output::kRightVariance)) return;
-  row_interpolation_.interpolate(EGOSGM_RIGHT, steps, belief.disparity, belief.variance);
-  row_interpolation_.interpolate(EGOSGM_RIGHT, steps, measured.disparity, measured.variance);
+void PublishStep::complete_rows(const Plan& plan, Prediction& prediction, StereoMaps& belief, StereoMaps& measured,
+                                Map& result) {
+  const Wanted& wanted = plan.wanted;
+  const Views views = plan.published();
+  const bool has_variance = wanted.has(Output::kVariance) || wanted.has(Output::kRightVariance);
+  row_interpolation_.interpolate(result, belief.variance, views);
+  if (has_variance || wanted.has(Output::kDynamic)) {
+    row_interpolation_.interpolate(belief.disparity, belief.variance, views);
+  }
+  if (has_variance || wanted.has(Output::kMeasured) || wanted.has(Output::kMeasuredVariance)) {
+    row_interpolation_.interpolate(measured.disparity, measured.variance, views);
+  }
+  if (plan.predicts() && (wanted.has(Output::kPredicted) || wanted.has(Output::kPredictedVariance))) {
+    row_interpolation_.interpolate(prediction.maps.disparity, prediction.maps.variance, {1, views.row_steps});
+  }
 }
 
 void PublishStep::write(const Plan& plan, const Reasons::Inputs& inputs, const Belief& before, Belief& after,
@@ -51,7 +59,8 @@ void PublishStep::write(const Plan& plan, const Reasons::Inputs& inputs, const B
     output_variance_.compute(inputs.fused.output, inputs.fused.belief, inputs.match.measured, variance,
                              wanted.has(Output::kRightVariance) ? Views::kBoth : Views::kLeft);
   }
-  if (wanted.has(Output::kReason)) reasons_[inputs.match.images.type].explain(inputs, published.reason);
+  if (wanted.has(Output::kReason))
+    reasons_[inputs.match.images.type].explain(inputs, plan.tracked.row_steps.left, published.reason);
   after.has_halved = wanted.has(Output::kDynamic) && dynamic_map_;
   if (after.has_halved) dynamic_map_->keep(inputs.match.images, after.halved);
   if (!wanted.has(Output::kDynamic)) return;

@@ -40,9 +40,9 @@ class PublishStep {
   /// Builds what is wanted of images of `type`.
   void prepare(PixelType type, const Wanted& wanted);
 
-  /// Fills the rows that the right view lacks, in the maps that its wanted outputs are made of. `result`: the
-  /// disparities that are published.
-  void complete_right(const Plan& plan, StereoMaps& belief, StereoMaps& measured, Map& result);
+  /// Fills the rows that are left out, in the maps that wanted outputs are made of. `result`: the disparities that are
+  /// published.
+  void complete_rows(const Plan& plan, Prediction& prediction, StereoMaps& belief, StereoMaps& measured, Map& result);
   /// Writes what the plan wants. `before`: the belief of the frame before. `after`: this frame's; it keeps the left
   /// image for the next frame's `dynamic` where this frame's is wanted. `variance`: [px^2] of what is published.
   void write(const Plan& plan, const Reasons::Inputs& inputs, const Belief& before, Belief& after, Map& variance,

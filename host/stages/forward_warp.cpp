@@ -102,7 +102,8 @@ void ForwardWarp::warp(const StereoMaps& belief, const FlagMap& evidence, const 
   const shared::ImageSize size = stage_.size();
   Motion motion = current_from_previous;
   motion.covariance *= static_cast<double>(options_.motion_noise);
-  const shared::DisparityMotion left = disparity_motion(calibration_, motion, EGOSGM_LEFT);
+  shared::DisparityMotion left = disparity_motion(calibration_, motion, EGOSGM_LEFT);
+  left.row_step = views.row_steps.left;
   shared::DisparityMotion right = disparity_motion(calibration_, motion, EGOSGM_RIGHT);
   right.row_step = views.row_steps.right;
   if (bands_) {

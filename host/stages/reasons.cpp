@@ -64,7 +64,7 @@ Reasons::Reasons(ocl::Context& context, shared::ImageSize size, PixelType type, 
       find_repeats_(stage_, "find_repeats"),
       explain_(stage_, "explain") {}
 
-void Reasons::explain(const Inputs& inputs, Bytes& reasons) {
+void Reasons::explain(const Inputs& inputs, cl_int row_step, Bytes& reasons) {
   const auto& [match, prediction, fused] = inputs;
   const cl_int has_prediction = prediction ? 1 : 0, has_runs = match.runs ? 1 : 0;
   const Bytes& bytes = match.images.pixels;  // in place of what there is not
@@ -75,8 +75,8 @@ void Reasons::explain(const Inputs& inputs, Bytes& reasons) {
     stage_.launch(find_repeats_, each_block, stage_.size(), disparities_, padding_, match.codes,
                   match.measured.disparity, repeats_);
   }
-  stage_.launch_pixels(explain_, /*views=*/1, EGOSGM_LEAST_CHANGE * match.grey_step, bytes, has_census_, repeats_,
-                       has_prediction, prediction ? prediction->warped.disparity : match.measured.disparity,
+  stage_.launch_pixels(explain_, /*views=*/1, row_step, EGOSGM_LEAST_CHANGE * match.grey_step, bytes, has_census_,
+                       repeats_, has_prediction, prediction ? prediction->warped.disparity : match.measured.disparity,
                        prediction ? prediction->hidden : bytes, match.measured.disparity, has_runs,
                        match.runs ? *match.runs : no_runs, fused.output, fused.doubtful, fused.evidence != nullptr,
                        fused.evidence ? *fused.evidence : fused.doubtful, fused.block_evidence, reasons);

@@ -43,7 +43,9 @@ class Reasons {
   Reasons(ocl::Context& context, shared::ImageSize size, PixelType type, const MethodOptions& options,
           const Bytes& repeats, int pixels = 0);
 
-  void explain(const Inputs& inputs, Bytes& reasons);
+  /// `row_step`: every so many-th row was predicted, measured and fused. A row between has what is known of the one
+  /// above it.
+  void explain(const Inputs& inputs, cl_int row_step, Bytes& reasons);
 
  private:
   using In = const ocl::Buffer<float>;
@@ -52,8 +54,8 @@ class Reasons {
   const cl_int disparities_, has_census_, padding_;
   Bytes repeats_;  // of blocks
   ocl::Kernel<const shared::ImageSize, const cl_int, const cl_int, const ocl::Buffer<cl_uint>, In, Bytes> find_repeats_;
-  ocl::Kernel<const shared::ImageSize, const float, const Bytes, const cl_int, const Bytes, const cl_int, In,
-              const FlagMap, In, const cl_int, const ocl::Buffer<cl_ushort>, In, const FlagMap, const cl_int,
+  ocl::Kernel<const shared::ImageSize, const cl_int, const float, const Bytes, const cl_int, const Bytes, const cl_int,
+              In, const FlagMap, In, const cl_int, const ocl::Buffer<cl_ushort>, In, const FlagMap, const cl_int,
               const FlagMap, const ocl::Buffer<cl_int>, Bytes>
       explain_;
 };

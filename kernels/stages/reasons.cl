@@ -178,10 +178,11 @@ static inline Ints has_run(global const ushort* runs, const int x, const int wid
 #endif
 }
 
+// `row_step`: every so many-th row is predicted, measured and fused, and is asked for the rows below it, too.
 // `least_change`: the image is flat where grey values two columns apart differ by less in the mean. `repeats`: of
 // find_repeats. `runs`: of SpeckleRemoval. `doubtful`, `evidence`: of KalmanUpdate. `block_evidence`: of
 // Evidence. What there is not (has_repeats, has_prediction, has_runs, has_evidence) may be any buffer.
-COMPILED_ONCE void explain_row(const WorkItem at, const ImageSize size, const float least_change,
+COMPILED_ONCE void explain_row(const WorkItem at, const ImageSize size, const int row_step, const float least_change,
                                global const uchar* images, const int has_repeats, global const uchar* repeats,
                                const int has_prediction, global const float* warped, global const uchar* hidden,
                                global const float* measured, const int has_runs, global const ushort* runs,
@@ -189,7 +190,7 @@ COMPILED_ONCE void explain_row(const WorkItem at, const ImageSize size, const fl
                                global const uchar* evidence, global const int* block_evidence, global uchar* reasons) {
   const int y = at.y;
   const int width = size.width;
-  const size_t row = (size_t)y * width;
+  const size_t row = (size_t)y * width, known = (size_t)(y - y % row_step) * width;
   const int columns = (width + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
   global const uchar* repeats_of_blocks = repeats + (size_t)(y / EGOSGM_COARSE) * columns;
   global const int* evidence_of_blocks = block_evidence + (size_t)(y / EGOSGM_COARSE) * EGOSGM_EVIDENCE_STRIDE(width);
@@ -198,21 +199,21 @@ COMPILED_ONCE void explain_row(const WorkItem at, const ImageSize size, const fl
 
   FOR_PIXELS(x, width) {
     const Floats d = load_pixels(disparity + row, x, width);
-    const Floats z = load_pixels(measured + row, x, width);
-    const Floats w = has_prediction ? load_pixels(warped + row, x, width) : INVALID;
+    const Floats z = load_pixels(measured + known, x, width);
+    const Floats w = has_prediction ? load_pixels(warped + known, x, width) : INVALID;
     const Ints has_value = d > INVALID;
     const Ints is_measured = z > INVALID;
     const Ints is_warped = w > INVALID;
-    const Ints is_hidden = has_prediction ? load_bytes(hidden + row, x, width) != 0 : (Ints)(0);
-    const Ints is_doubtful = has_prediction ? load_bytes(doubtful + row, x, width) != 0 : (Ints)(0);
+    const Ints is_hidden = has_prediction ? load_bytes(hidden + known, x, width) != 0 : (Ints)(0);
+    const Ints is_doubtful = has_prediction ? load_bytes(doubtful + known, x, width) != 0 : (Ints)(0);
     const Ints differs = has_value ? is_doubtful : fabs(z - w) > off;
     const Ints contradicts = is_measured & is_warped & differs;
-    const Ints is_speckle = has_runs ? has_run(runs + row, x, width) & !is_measured : (Ints)(0);
-    const Ints is_uncovered = has_prediction ? (jump_in_row(warped + row, x, width) > jump) & !is_warped : (Ints)(0);
+    const Ints is_speckle = has_runs ? has_run(runs + known, x, width) & !is_measured : (Ints)(0);
+    const Ints is_uncovered = has_prediction ? (jump_in_row(warped + known, x, width) > jump) & !is_warped : (Ints)(0);
     const Texture texture = texture_around(size, (global const Pixel*)images, x, y);
     Ints is_weak = 0, is_sure = 0;
     if (has_evidence) {
-      const Ints of_pixel = load_bytes(evidence + row, x, width);
+      const Ints of_pixel = load_bytes(evidence + known, x, width);
       is_sure = has_value & (of_pixel > EGOSGM_EVIDENCE_TRUSTED);
       is_weak = has_value      ? is_measured & (of_pixel < EGOSGM_EVIDENCE_TRUSTED)
                 : is_uncovered ? (Ints)(0)
@@ -236,12 +237,12 @@ COMPILED_ONCE void explain_row(const WorkItem at, const ImageSize size, const fl
   }
 }
 
-KERNEL void explain(const ImageSize size, const float least_change, global const uchar* images, const int has_repeats,
-                    global const uchar* repeats, const int has_prediction, global const float* warped,
-                    global const uchar* hidden, global const float* measured, const int has_runs,
-                    global const ushort* runs, global const float* disparity, global const uchar* doubtful,
-                    const int has_evidence, global const uchar* evidence, global const int* block_evidence,
-                    global uchar* reasons) {
-  explain_row(THIS_WORK_ITEM, size, least_change, images, has_repeats, repeats, has_prediction, warped, hidden,
-              measured, has_runs, runs, disparity, doubtful, has_evidence, evidence, block_evidence, reasons);
+KERNEL void explain(const ImageSize size, const int row_step, const float least_change, global const uchar* images,
+                    const int has_repeats, global const uchar* repeats, const int has_prediction,
+                    global const float* warped, global const uchar* hidden, global const float* measured,
+                    const int has_runs, global const ushort* runs, global const float* disparity,
+                    global const uchar* doubtful, const int has_evidence, global const uchar* evidence,
+                    global const int* block_evidence, global uchar* reasons) {
+  explain_row(THIS_WORK_ITEM, size, row_step, least_change, images, has_repeats, repeats, has_prediction, warped,
+              hidden, measured, has_runs, runs, disparity, doubtful, has_evidence, evidence, block_evidence, reasons);
 }

@@ -7,12 +7,12 @@
 // lint: PIXELS=1
 // lint: PIXELS=16
 
-COMPILED_ONCE void interpolate_row(const WorkItem at, const ImageSize size, const int view, const int row_step,
+COMPILED_ONCE void interpolate_row(const WorkItem at, const ImageSize size, const RowSteps row_steps,
                                    global float* disparities, global float* variances) {
-  const int own = at.y, above = own - own % row_step, next = above + row_step;
+  const int step = row_step_of(at.view, row_steps), own = at.y, above = own - own % step, next = above + step;
   if (own == above) return;
   const int below = next < size.height ? next : above, width = size.width;
-  const size_t first = (size_t)view * size.height * width, row = first + (size_t)own * width;
+  const size_t first = (size_t)at.view * size.height * width, row = first + (size_t)own * width;
   const size_t row_above = first + (size_t)above * width, row_below = first + (size_t)below * width;
   FOR_PIXELS(x, width) {
     const Floats d = load_pixels(disparities + row_above, x, width), p = load_pixels(variances + row_above, x, width);
@@ -25,7 +25,7 @@ COMPILED_ONCE void interpolate_row(const WorkItem at, const ImageSize size, cons
   }
 }
 
-KERNEL void interpolate_rows(const ImageSize size, const int view, const int row_step, global float* disparities,
+KERNEL void interpolate_rows(const ImageSize size, const RowSteps row_steps, global float* disparities,
                              global float* variances) {
-  interpolate_row(THIS_WORK_ITEM, size, view, row_step, disparities, variances);
+  interpolate_row(THIS_WORK_ITEM, size, row_steps, disparities, variances);
 }

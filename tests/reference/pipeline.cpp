@@ -70,8 +70,7 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
   const bool has_prediction = frame.unpredicted.empty();
   frame.tracked_views = options_.track_right ? 2 : 1;
   if (has_prediction) {
-    frame.matched_rows = {row_step(), row_step()};
-    if (options_.track_right) frame.tracked_rows.right = row_step();
+    frame.matched_rows = frame.tracked_rows = {row_step(), row_step()};
   }
   if (has_prediction) predict(*motions, frame);
 
@@ -106,7 +105,7 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
   if (!options_.temporal) return frame;
   offset_ = frame.passes.back().offset;
   has_offset_ = true;
-  belief_ = frame.result;
+  belief_ = row_interpolation(size_, step, frame.result);
   belief_->evidence = frame.evidence;
   greys_ = images.greys;
   bits_ = images.bits;
@@ -131,6 +130,7 @@ std::vector<std::uint8_t> Pipeline::explain(const Images& images, const Frame& f
                   .code_padding = code_padding_,
                   .warped = frame.warped.disparity,
                   .hidden = frame.predicted.hidden,
+                  .row_step = frame.tracked_rows.left,
                   .consistent = pass.consistent.disparity,
                   .measured = pass.measured.disparity,
                   .belief = {frame.output, frame.result.variance},
@@ -141,9 +141,9 @@ std::vector<std::uint8_t> Pipeline::explain(const Images& images, const Frame& f
 
 void Pipeline::predict(const ViewMotions& motions, Frame& frame) const {
   const shared::RowSteps step = frame.tracked_rows;
-  shared::DisparityMotion right = motions.right;
-  right.row_step = step.right;
-  frame.warped = forward_warp(size_, range_, motions.left, right, options_.forward_warp.process_noise_px2, *belief_);
+  shared::DisparityMotion left = motions.left, right = motions.right;
+  left.row_step = step.left, right.row_step = step.right;
+  frame.warped = forward_warp(size_, range_, left, right, options_.forward_warp.process_noise_px2, *belief_);
   const float max_jump_px = options_.edge_rejection.max_jump_px;
   const ConsistencyCheckOptions& check = options_.consistency;
   if (max_jump_px > 0) frame.without_edges = edge_rejection(size_, max_jump_px, frame.warped, step);
@@ -199,7 +199,7 @@ Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOff
   pass.consistent =
       consistency_check(size_, reads_off ? check.read_off_px : check.measurement_px, false, pass.smoothed, step);
   const bool judges_by_evidence = !frame.predicted.disparity.empty() && has_evidence();
-  pass.measured = row_interpolation(size_, {step.left, reads_off ? step.right : 1}, pass.consistent);
+  pass.measured = pass.consistent;
   if (!judges_by_evidence) pass.measured = speckle_removal(size_, options_.speckle_removal, pass.consistent);
   if (!judges_by_evidence && reads_off) {
     const std::ptrdiff_t right = static_cast<std::ptrdiff_t>(pass.measured.disparity.size() / 2);

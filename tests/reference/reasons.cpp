@@ -21,8 +21,10 @@ class Pixels {
       : size_(size), options_(options), in_(inputs) {}
 
   Reason reason_of(int x, int y) const {
-    const std::size_t i = index(x, y);
-    const float d = in_.belief.disparity[i], z = in_.measured[i], w = in_.warped.empty() ? kNone : in_.warped[i];
+    const int known_y = y / in_.row_step * in_.row_step;
+    const std::size_t i = index(x, known_y);
+    const float d = in_.belief.disparity[index(x, y)], z = in_.measured[i],
+                w = in_.warped.empty() ? kNone : in_.warped[i];
     if (!in_.hidden.empty() && in_.hidden[i]) return Reason::kNearer;
     if (z != kNone && w != kNone) {
       const bool differs = d == kNone ? std::abs(z - w) > 1 : in_.doubtful[i] != 0;
@@ -36,7 +38,7 @@ class Pixels {
         static_cast<float>(window.changes) < kLeastChange * in_.grey_step * static_cast<float>(window.pixels)) {
       return Reason::kFlat;
     }
-    const bool is_uncovered = !in_.warped.empty() && w == kNone && jump_beside(x, y) > kUncoveredJumpPx;
+    const bool is_uncovered = !in_.warped.empty() && w == kNone && jump_beside(x, known_y) > kUncoveredJumpPx;
     if (d == kNone && !is_uncovered && is_like_noise(x, y)) return Reason::kFlat;
     const bool removes_speckles = options_.speckle_removal.max_size_px > 0;
     if (removes_speckles && d == kNone && z == kNone && in_.consistent[i] != kNone) return Reason::kSpeckle;

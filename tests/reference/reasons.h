@@ -19,6 +19,7 @@ struct ReasonInputs {
   int code_padding = 0;
   std::vector<float> warped;
   std::vector<std::uint8_t> hidden;
+  int row_step = 1;                         // every so many-th row was predicted, measured and fused
   std::vector<float> consistent, measured;  // before and after speckles were dropped
   testing::HostMaps belief;
   std::vector<std::uint8_t> doubtful;  // of the update; not read without a prediction

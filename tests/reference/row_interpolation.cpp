@@ -15,7 +15,7 @@ testing::HostMaps row_interpolation(shared::ImageSize size, shared::RowSteps row
     const std::size_t here = at(y), first = at(above), second = at(next < size.height ? next : above);
     const bool has_first = maps.disparity[first] != EGOSGM_INVALID_DISPARITY;
     const bool has_second = maps.disparity[second] != EGOSGM_INVALID_DISPARITY;
-    if (has_first && has_second && std::abs(maps.disparity[first] - maps.disparity[second]) <= 1) {
+    if (has_first && has_second && std::abs(maps.disparity[first] - maps.disparity[second]) <= 3) {
       maps.disparity[here] = (maps.disparity[first] + maps.disparity[second]) / 2;
       maps.variance[here] = (maps.variance[first] + maps.variance[second]) / 2;
     } else {

@@ -95,14 +95,14 @@ TEST_P(ForwardWarpTest, EqualsReference) {
     for (int repetition = 0; repetition < 3; ++repetition) {
       Motion motion = random_motion(random, 0.5, 0.05);
       if (repetition > 0) motion.covariance = random_covariance(random, 0.01);
-      const shared::DisparityMotion left = disparity_motion(calibration, motion, EGOSGM_LEFT);
+      shared::DisparityMotion left = disparity_motion(calibration, motion, EGOSGM_LEFT);
       shared::DisparityMotion right = disparity_motion(calibration, motion, EGOSGM_RIGHT);
       SCOPED_TRACE(range.min);
       testing::expect_reference(
           size, before,
           [&](int pixels, Views views) { return warp(size, calibration, range, 0.25f, belief, motion, pixels, views); },
           [&](shared::RowSteps steps) {
-            right.row_step = steps.right;
+            left.row_step = steps.left, right.row_step = steps.right;
             return reference::without_absent_rows(size, steps,
                                                   reference::forward_warp(size, range, left, right, 0.25f, belief));
           });

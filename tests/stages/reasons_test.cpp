@@ -60,7 +60,7 @@ std::vector<cl_uchar> reasons_of(shared::ImageSize size, const MethodOptions& op
       {{images, codes, inputs.grey_step, measured, options.speckle_removal.max_size_px > 0 ? &runs : nullptr},
        inputs.warped.empty() ? nullptr : &prediction,
        {belief, belief.disparity, doubtful, inputs.evidence.empty() ? nullptr : &evidence, block_evidence}},
-      found);
+      inputs.row_step, found);
   return found.read(context);
 }
 
@@ -114,6 +114,7 @@ TEST_P(ReasonsTest, EqualsReference) {
         options.banded_sgm.cost = cost;
         reference::ReasonInputs inputs = random_inputs(size, white, 31);
         if (!has_prediction) inputs.warped.clear(), inputs.hidden.clear(), inputs.evidence.clear();
+        if (has_prediction) inputs.row_step = 2;
         for (const int pixels : {1, 16}) {
           const std::vector<cl_uchar> actual = reasons_of(size, options, inputs, pixels);
           EXPECT_TRUE(testing::same_bits(actual, reference::reasons(size, options, inputs), size))

@@ -16,9 +16,7 @@ testing::HostMaps interpolate(shared::ImageSize size, shared::RowSteps steps, co
   ocl::Context context(testing::any_device());
   RowInterpolation stage(context, size, pixels);
   StereoMaps on_device = testing::upload(context, size, maps);
-  for (const int view : {EGOSGM_LEFT, EGOSGM_RIGHT}) {
-    stage.interpolate(view, steps, on_device.disparity, on_device.variance);
-  }
+  stage.interpolate(on_device.disparity, on_device.variance, {2, steps});
   return testing::download(context, on_device);
 }
 
@@ -26,7 +24,7 @@ EGOSGM_TEST_AT_ALL_SIZES(RowInterpolationTest);
 
 TEST_P(RowInterpolationTest, EqualsReference) {
   const shared::ImageSize size = GetParam();
-  const testing::HostMaps maps = testing::random_maps(size, 0, 4, 0.2, 51);
+  const testing::HostMaps maps = testing::random_maps(size, 0, 12, 0.2, 51);
   for (const shared::RowSteps steps : {shared::RowSteps{1, 2}, {2, 1}, {3, 3}}) {
     const testing::HostMaps expected = testing::masked(reference::row_interpolation(size, steps, maps));
     for (const int pixels : {1, 16}) {
@@ -40,9 +38,9 @@ TEST_P(RowInterpolationTest, EqualsReference) {
 TEST(RowInterpolation, TakesTheMeanOfTwoRowsOrTheOnlyOne) {
   const std::vector<float> left(8, 9.0f), variances{2, 2, 2, 2, 2, 2, 2, 2, 1, 8, 3, 8, 2, 8, 5, 8};
   testing::HostMaps maps{left, variances};
-  for (const float d : {4.0f, 0.0f, 5.0f, 0.0f, 7.0f, 0.0f, kNone, 0.0f}) maps.disparity.push_back(d);
+  for (const float d : {4.0f, 0.0f, 7.0f, 0.0f, 10.5f, 0.0f, kNone, 0.0f}) maps.disparity.push_back(d);
   const testing::HostMaps out = interpolate({1, 8}, {1, 2}, maps);
-  EXPECT_EQ(out.disparity, (std::vector<float>{9, 9, 9, 9, 9, 9, 9, 9, 4, 4.5f, 5, kNone, 7, 7, kNone, kNone}));
+  EXPECT_EQ(out.disparity, (std::vector<float>{9, 9, 9, 9, 9, 9, 9, 9, 4, 5.5f, 7, kNone, 10.5f, 10.5f, kNone, kNone}));
   EXPECT_EQ(out.variance, (std::vector<float>{2, 2, 2, 2, 2, 2, 2, 2, 1, 2, 3, 0, 2, 2, 0, 0}));
 }
 
