@@ -61,9 +61,7 @@ COMPILED_ONCE void gather_coarse_block(const WorkItem at, const ImageSize size, 
   const ImageSize blocks = blocks_of(size);
   const int width = (size.width + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
   const int height = (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
-  const int x = at.x;
-  const int y = at.y;
-  const int view = at.view;
+  const int x = at.x, y = at.y, view = at.view;
   if (x >= blocks.width || y >= blocks.height) return;
 
 #if EGOSGM_BLOCK != 2 * EGOSGM_COARSE
