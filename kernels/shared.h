@@ -54,17 +54,9 @@ typedef struct {
 // Maps and images of a stereo pair lie in one buffer, the left view first: index view * width * height + y * width + x.
 #define EGOSGM_LEFT 0
 #define EGOSGM_RIGHT 1
-// Of each view, every so many-th row is there, from the first one on. What lies between is neither written nor read.
-typedef struct {
-  i32 left, right;
-} RowSteps;
-static inline int row_step_of(const int view, const RowSteps row_steps) {
-  return view == EGOSGM_LEFT ? row_steps.left : row_steps.right;
-}
 #ifndef __cplusplus
-static inline bool has_row(const WorkItem at, const RowSteps row_steps) {
-  return at.y % row_step_of(at.view, row_steps) == 0;
-}
+// Of both views, every row_step-th row is there, from the first one on. What lies between is neither written nor read.
+static inline bool has_row(const WorkItem at, const int row_step) { return at.y % row_step == 0; }
 #endif
 
 // Disparities are matched in chunks of this many lanes: one, or an even number of them.
@@ -146,7 +138,7 @@ typedef struct {
   i32 p1, s_max;
   f32 variance_floor, variance_per_step, variance_per_square;
   i32 reads_off;  // whether the left view leaves ranks for the right one (sgm_cells.h)
-  RowSteps row_steps;
+  i32 row_step;
   i32 first_view;  // of those that are matched, which lie one behind the other in what only a match needs
 } SgmParameters;
 
@@ -159,7 +151,7 @@ typedef struct {
   i32 has_evidence;  // else what the frame knows of evidence is not read, and all that lives is confirmed
   i32 repeats;       // the images are those of the frame before, which make nobody surer
   i32 sees_again;    // the camera stands: what has no prediction was turned down a frame before
-  RowSteps row_steps;
+  i32 row_step;
 } KalmanParameters;
 
 // The motion of a view's disparity space (eqs. 1-4): rows 1, 2 and 4 of H = Gamma T Gamma^-1; row 3 is (0, 0, 1, 0).
@@ -173,8 +165,8 @@ typedef struct {
 
 #ifdef __cplusplus
 static_assert(sizeof(ImageSize) == 8 && sizeof(DisparityRange) == 8 && sizeof(Band) == 8 && sizeof(RowSum) == 8 &&
-                  sizeof(BlockRange) == 12 && sizeof(EvidenceSum) == 8 && sizeof(SgmParameters) == 56 &&
-                  sizeof(KalmanParameters) == 40 && sizeof(DisparityMotion) == 88,
+                  sizeof(BlockRange) == 12 && sizeof(EvidenceSum) == 8 && sizeof(SgmParameters) == 52 &&
+                  sizeof(KalmanParameters) == 36 && sizeof(DisparityMotion) == 88,
               "kernels/*.cl read these layouts");
 }  // namespace egosgm::shared
 #endif

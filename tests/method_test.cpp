@@ -109,9 +109,9 @@ TEST(Method, AFrameLeavesTheBeliefBeforeItAsItWas) {
   const std::vector<float> variance = first.maps.variance.read(built.context);
   const std::vector<float> terms = first.offset.terms.read(built.context);
   frame(1, first, second);
-  const auto of_second = [&] {  // the rows between those of the right view belong to nobody
+  const auto of_second = [&] {  // absent rows hold anything
     const HostMaps maps = masked({second.maps.disparity.read(built.context), second.maps.variance.read(built.context)});
-    return reference::without_absent_rows(kSize, {1, options(32, 0).banded_sgm.row_step}, maps);
+    return reference::without_absent_rows(kSize, options(32, 0).banded_sgm.row_step, maps);
   };
   const HostMaps once = of_second();
   EXPECT_EQ(first.maps.disparity.read(built.context), disparity);

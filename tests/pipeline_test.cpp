@@ -24,7 +24,7 @@ reference::Pipeline make_reference(const Setting& setting) {
 /// Of a map of `size` the rows of `views`.
 template <typename T>
 std::vector<T> of_views(const std::vector<T>& both, Views views, shared::ImageSize size) {
-  std::vector<T> present = both.empty() ? both : reference::without_absent_rows(size, views.row_steps, both, T{});
+  std::vector<T> present = both.empty() ? both : reference::without_absent_rows(size, views.row_step, both, T{});
   present.resize(both.size() / 2 * static_cast<std::size_t>(views.count));
   return present;
 }
@@ -57,7 +57,7 @@ void expect_same(const reference::Pass& actual, const reference::Pass& expected,
   EXPECT_TRUE(same(actual.band.row_sums, expected.band.row_sums, {1, size.height})) << "row sums";
   EXPECT_TRUE(same_bits(actual.codes, expected.codes, {(size.width + 2 * padding) * words, size.height})) << "codes";
   EXPECT_TRUE(same(actual.penalties, expected.penalties, {4 * size.width, size.height})) << "penalties";
-  const Views measured{2, views.row_steps};
+  const Views measured{2, views.row_step};
   expect_same("matched", actual.matched, expected.matched, size, measured);
   expect_same("smoothed", actual.smoothed, expected.smoothed, size, measured);
   ASSERT_FALSE(actual.measured.disparity.empty());
@@ -65,9 +65,9 @@ void expect_same(const reference::Pass& actual, const reference::Pass& expected,
 }
 
 void expect_same(const reference::Frame& actual, const reference::Frame& expected, const Setting& setting) {
-  const Views tracked{expected.tracked_views, expected.tracked_rows};
-  const Views matched{expected.predicted.disparity.empty() ? 2 : tracked.count, expected.matched_rows};
-  const Views both{2, tracked.row_steps};
+  const Views tracked{expected.tracked_views, expected.row_step};
+  const Views matched{expected.predicted.disparity.empty() ? 2 : tracked.count, expected.row_step};
+  const Views both{2, tracked.row_step};
   expect_same("warped", actual.warped, expected.warped, setting.size, tracked);
   expect_same("without_edges", actual.without_edges, expected.without_edges, setting.size, tracked);
   expect_same("filled", actual.filled, expected.filled, setting.size, tracked);
@@ -99,15 +99,15 @@ std::vector<T> half(const std::vector<T>& both, int view) {
 
 void expect_outputs(const OutputMemory& outputs, const reference::Frame& expected, shared::ImageSize size) {
   const bool has_prediction = !expected.predicted.disparity.empty();
-  const shared::RowSteps steps = expected.tracked_rows;
+  const int step = expected.row_step;
   const HostMaps predicted =
-      reference::row_interpolation(size, steps, has_prediction ? expected.predicted : empty_maps(size));
+      reference::row_interpolation(size, step, has_prediction ? expected.predicted : empty_maps(size));
   const reference::Pass& pass = expected.passes.back();
-  const HostMaps measured = reference::row_interpolation(size, steps, pass.measured);
+  const HostMaps measured = reference::row_interpolation(size, step, pass.measured);
   std::vector<std::uint16_t> widths;
   for (const shared::Band& band : half(pass.band.bands, 0)) {
     const std::size_t row = widths.size() / size.width;
-    const bool is_matched = row % expected.matched_rows.left == 0;
+    const bool is_matched = row % expected.row_step == 0;
     widths.push_back(static_cast<std::uint16_t>(is_matched ? band.last - band.first + 1 : 0));
   }
   const auto expect_map = [&](const char* name, const auto& map, const auto& values) {
@@ -134,8 +134,7 @@ void expect_report(const FrameReport& report, const reference::Frame& expected, 
   for (const reference::Pass& pass : expected.passes) {
     for (std::size_t i = 0; i < views * pixel_count(setting.size); ++i) {
       const int row = static_cast<int>(i / setting.size.width), height = setting.size.height;
-      if (row % height % shared::row_step_of(row / height, expected.matched_rows) == 0)
-        searched += pass.band.bands[i].chunks * EGOSGM_LANES;
+      if (row % height % expected.row_step == 0) searched += pass.band.bands[i].chunks * EGOSGM_LANES;
     }
     const int coarse_chunks = SearchBand::max_chunks(CoarseMatch::coarse_range(range_of(setting.options)));
     searched += static_cast<double>(pass.coarse.size()) * coarse_chunks * EGOSGM_LANES;  // of both views
@@ -146,7 +145,7 @@ void expect_report(const FrameReport& report, const reference::Frame& expected, 
   EXPECT_NEAR(report.density, valid_part(half(expected.output, 0)), 1e-12);
   EXPECT_EQ(static_cast<float>(report.vertical_offset_px), expected.vertical_offset_px);
   const std::vector<float> of_matched_rows =
-      reference::present_rows(setting.size, EGOSGM_LEFT, expected.matched_rows.left, expected.predicted.disparity);
+      reference::present_rows(setting.size, EGOSGM_LEFT, expected.row_step, expected.predicted.disparity);
   const double predicted = !has_prediction ? 0 : valid_part(of_matched_rows);
   EXPECT_NEAR(report.predicted_fraction, predicted, 1e-12);
 }

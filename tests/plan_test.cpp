@@ -10,9 +10,9 @@ namespace egosgm {
 namespace {
 
 std::string text_of(Views views) {
-  const std::string left = views.row_steps.left == 1 ? "left" : "left/2";
+  const std::string left = views.row_step == 1 ? "left" : "left/2";
   if (views.count == 1) return left;
-  return left + (views.row_steps.right == 1 ? " right" : " right/2");
+  return left + (views.row_step == 1 ? " right" : " right/2");
 }
 
 /// What is decided, in a row.

@@ -100,7 +100,7 @@ void FrameQueue::submit(const ImageView& left, const ImageView& right, const std
        .bands = workspace.bands,
        .matched = plan.matched,
        .parts = {plan.matches, &method_.matcher().banded_sgm().stripes(),
-                 plan.has_coarse_match ? method_.search().coarse_cells() : 0, plan.matched.row_steps},
+                 plan.has_coarse_match ? method_.search().coarse_cells() : 0, plan.matched.row_step},
        .offset = results.offset,
        .published = workspace.published.maps(wanted)},
       outputs);

@@ -29,8 +29,7 @@ double matched_cells(const MatchedFrame& frame) {
   for (int view = 0; view < views; ++view) {
     for (const Stripe& stripe : *frame.parts.stripes) {
       const std::size_t first = static_cast<std::size_t>(view) * frame.size.height + stripe.first_row;
-      const int step = shared::row_step_of(view, frame.parts.row_steps);
-      for (int row = 0; row < stripe.rows; row += step) cells += frame.row_sums[first + row].cells;
+      for (int row = 0; row < stripe.rows; row += frame.parts.row_step) cells += frame.row_sums[first + row].cells;
     }
   }
   return static_cast<double>(frame.parts.passes) * static_cast<double>(cells);
@@ -44,7 +43,7 @@ void report_matching(const MatchedFrame& frame, FrameReport& report) {
       static_cast<std::uint32_t>(frame.size.width * SearchBand::max_chunks(frame.range)) * EGOSGM_LANES;
   std::uint64_t predicted_pixels = 0, pixels = 0;
   report.searched_everything = true;
-  for (int y = 0; y < frame.size.height; y += frame.parts.row_steps.left) {
+  for (int y = 0; y < frame.size.height; y += frame.parts.row_step) {
     predicted_pixels += frame.row_sums[y].predicted;
     pixels += static_cast<std::uint64_t>(frame.size.width);
     report.searched_everything = report.searched_everything && frame.row_sums[y].cells == whole_row;

@@ -16,7 +16,7 @@ struct MatchedParts {
   int passes;                          // each over all bands
   const std::vector<Stripe>* stripes;  // in which
   std::uint64_t coarse_cells;          // and in each pass, these of CoarseMatch
-  shared::RowSteps row_steps{1, 1};    // of the rows of each stripe
+  cl_int row_step = 1;                 // of the rows of each stripe
 };
 
 /// The search of a frame, counted from its bands.

@@ -146,7 +146,7 @@ void FrameTransfer::give(const OutputText& text, const MapView<std::uint16_t>& v
   copy_rows(fetched<shared::Band>(text.output), view,
             [](const shared::Band& b) { return static_cast<std::uint16_t>(b.last - b.first + 1); });
   for (int y = 0; y < view.height; ++y) {
-    if (y % parts_.row_steps.left == 0) continue;
+    if (y % parts_.row_step == 0) continue;
     auto* row = reinterpret_cast<std::uint16_t*>(reinterpret_cast<char*>(view.data) + y * view.stride_bytes);
     std::fill_n(row, view.width, std::uint16_t{0});
   }

@@ -35,7 +35,7 @@ void FuseStep::update(const Plan& plan, const Matched& matched, const Prediction
   if (median_filter_) median_filter_->fill(fusion.fused, fusion.smoothed, belief.variance, plan.tracked);
   StereoMaps smoothed{median_filter_ ? fusion.smoothed : fusion.fused, belief.variance};
   if (right_map_) {
-    right_map_->complete(measured, left_right_px_, smoothed, plan.wanted.has_right(), plan.tracked.row_steps);
+    right_map_->complete(measured, left_right_px_, smoothed, plan.wanted.has_right(), plan.tracked.row_step);
   }
   const Views checked = plan.wanted.has_right() ? plan.with_right() : plan.tracked;
   consistency_.check(smoothed.disparity, left_right_px_, outside_, belief.disparity, checked);

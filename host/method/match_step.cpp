@@ -28,7 +28,7 @@ MatchStep::MatchStep(ocl::Context& context, shared::ImageSize size, const Method
 void MatchStep::measure(const Plan& plan, const FrameImages& images, const SearchBands& bands, Matching& matching,
                         StereoMaps& measured) {
   const bool reads_off = plan.matched.count == 1;
-  const Views views{2, plan.matched.row_steps};
+  const Views views{2, plan.matched.row_step};
   StereoMaps matched{matching.matched, measured.variance};
   if (reads_off) {
     matcher_.reading_off(images, bands, matched, plan.matched, plan.coded_rows());

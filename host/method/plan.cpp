@@ -30,8 +30,7 @@ Plan plan_of(const MethodOptions& options, std::optional<Unpredicted> why_no_bel
   plan.tracked = options.track_right ? Views::kBoth : Views::kLeft;
   plan.matched = plan.predicts() ? plan.tracked : Views::kBoth;
   if (searches_bands && Evidence::is_of(options)) {
-    const cl_int step = options.banded_sgm.row_step;
-    plan.matched.row_steps = plan.tracked.row_steps = {step, step};
+    plan.matched.row_step = plan.tracked.row_step = options.banded_sgm.row_step;
   }
   plan.matches = options.vertical_alignment.enabled && !knows_offset ? 2 : 1;
   plan.has_coarse_match = plan.fuses && options.search == SearchMode::kBand && options.coarse_match.enabled;

@@ -30,13 +30,11 @@ struct Plan {
 
   bool predicts() const { return !why_not; }
   /// The rows that need codes: those that are matched; reasons ask for those around each pixel.
-  shared::RowSteps coded_rows() const {
-    return wanted.has(Output::kReason) ? shared::RowSteps{1, 1} : matched.row_steps;
-  }
+  cl_int coded_rows() const { return wanted.has(Output::kReason) ? 1 : matched.row_step; }
   /// The views that are tracked, or both where the right one is made of the left one.
-  Views with_right() const { return {2, tracked.row_steps}; }
+  Views with_right() const { return {2, tracked.row_step}; }
   /// The views of which somebody wants maps.
-  Views published() const { return {wanted.has_right() ? 2 : 1, tracked.row_steps}; }
+  Views published() const { return {wanted.has_right() ? 2 : 1, tracked.row_step}; }
 };
 
 /// `why_no_belief`: why the belief has no maps, if it has none. `knows_offset`: whether it has a vertical offset.

@@ -48,7 +48,7 @@ void PublishStep::complete_rows(const Plan& plan, Prediction& prediction, Stereo
     row_interpolation_.interpolate(measured.disparity, measured.variance, views);
   }
   if (plan.predicts() && (wanted.has(Output::kPredicted) || wanted.has(Output::kPredictedVariance))) {
-    row_interpolation_.interpolate(prediction.maps.disparity, prediction.maps.variance, {1, views.row_steps});
+    row_interpolation_.interpolate(prediction.maps.disparity, prediction.maps.variance, {1, views.row_step});
   }
 }
 
@@ -60,7 +60,7 @@ void PublishStep::write(const Plan& plan, const Reasons::Inputs& inputs, const B
                              wanted.has(Output::kRightVariance) ? Views::kBoth : Views::kLeft);
   }
   if (wanted.has(Output::kReason))
-    reasons_[inputs.match.images.type].explain(inputs, plan.tracked.row_steps.left, published.reason);
+    reasons_[inputs.match.images.type].explain(inputs, plan.tracked.row_step, published.reason);
   after.has_halved = wanted.has(Output::kDynamic) && dynamic_map_;
   if (after.has_halved) dynamic_map_->keep(inputs.match.images, after.halved);
   if (!wanted.has(Output::kDynamic)) return;

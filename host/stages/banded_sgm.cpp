@@ -157,7 +157,7 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
                   .variance_per_step = options.variance_per_step_px2,
                   .variance_per_square = options.variance_per_square_px2,
                   .reads_off = 0,
-                  .row_steps = {1, 1},
+                  .row_step = 1,
                   .first_view = 0},
       launches_(launches),
       no_ranks_(context, 1) {
@@ -198,7 +198,7 @@ void BandedSgm::match_stripes(const MatchInputs& image, StereoMaps& measured, Vi
 void BandedSgm::match(const MatchInputs& inputs, StereoMaps& measured, Views views, bool reads_off) {
   shared::SgmParameters parameters = parameters_;
   parameters.reads_off = reads_off;
-  parameters.row_steps = views.row_steps;
+  parameters.row_step = views.row_step;
   if (reads_off) read_off_->clear();
   if (paths_) {
     paths_->match(parameters, inputs, measured, ranks(), views);

@@ -39,13 +39,12 @@ Census::Census(ocl::Context& context, shared::ImageSize size, PixelType type, Ma
       padding_(padding),
       census_(stage_, "census") {}
 
-void Census::encode(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes, shared::RowSteps row_steps,
-                    bool alike) {
+void Census::encode(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes, cl_int row_step, bool alike) {
   const shared::ImageSize size = stage_.size();
   ocl::Context& context = stage_.enter();
   const ocl::Range range = stage_.pixels() == 1 ? ocl::every_pixel(context, {size.width + 2 * padding_, size.height})
                                                 : ocl::every_row(context, size);
-  census_(context, range, size, row_steps, padding_, alike, images, codes);
+  census_(context, range, size, row_step, padding_, alike, images, codes);
 }
 
 }  // namespace egosgm

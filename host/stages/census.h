@@ -20,12 +20,12 @@ class Census {
          int words = 0);
 
   /// `images`: both views' pixels, the left view first, without gaps. Leaves the codes of absent rows as they are.
-  void encode(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes, shared::RowSteps row_steps = {1, 1}) {
-    encode(images, codes, row_steps, false);
+  void encode(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes, cl_int row_step = 1) {
+    encode(images, codes, row_step, false);
   }
   /// Which pixels of each window are about as bright as its centre. REQUIRES: the census of 9x7 of 16 bits.
   void encode_alike(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes) {
-    encode(images, codes, {1, 1}, true);
+    encode(images, codes, 1, true);
   }
 
   /// 32-bit words of a code, and of all codes.
@@ -35,11 +35,11 @@ class Census {
            std::max(code_words, words(cost));
   }
 
-  using Kernel = ocl::Kernel<const shared::ImageSize, const shared::RowSteps, const cl_int, const cl_int,
+  using Kernel = ocl::Kernel<const shared::ImageSize, const cl_int, const cl_int, const cl_int,
                              const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uint>>;
 
  private:
-  void encode(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes, shared::RowSteps row_steps, bool alike);
+  void encode(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes, cl_int row_step, bool alike);
 
   ocl::Stage stage_;
   const cl_int padding_;

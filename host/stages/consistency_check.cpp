@@ -9,7 +9,7 @@ ConsistencyCheck::ConsistencyCheck(ocl::Context& context, shared::ImageSize size
 void ConsistencyCheck::check(const Map& disparity, float max_difference_px, OutsideView outside, Map& kept,
                              Views views) {
   const cl_int keep_outside = outside == OutsideView::kKeep;
-  stage_.launch_pixels(check_, views.count, views.row_steps, max_difference_px, keep_outside, disparity, kept);
+  stage_.launch_pixels(check_, views.count, views.row_step, max_difference_px, keep_outside, disparity, kept);
 }
 
 }  // namespace egosgm

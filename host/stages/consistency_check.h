@@ -25,7 +25,7 @@ class ConsistencyCheck {
 
  private:
   ocl::Stage stage_;
-  ocl::Kernel<const shared::ImageSize, const shared::RowSteps, const float, const cl_int, const Map, Map> check_;
+  ocl::Kernel<const shared::ImageSize, const cl_int, const float, const cl_int, const Map, Map> check_;
 };
 
 }  // namespace egosgm

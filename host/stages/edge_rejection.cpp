@@ -10,7 +10,7 @@ EdgeRejection::EdgeRejection(ocl::Context& context, shared::ImageSize size, cons
       reject_(stage_, "reject") {}
 
 void EdgeRejection::reject(const Map& disparity, Map& kept, Views views) {
-  stage_.launch_pixels(reject_, views.count, views.row_steps, max_jump_px_, disparity, kept);
+  stage_.launch_pixels(reject_, views.count, views.row_step, max_jump_px_, disparity, kept);
 }
 
 }  // namespace egosgm

@@ -21,7 +21,7 @@ class EdgeRejection {
  private:
   ocl::Stage stage_;
   const float max_jump_px_;
-  ocl::Kernel<const shared::ImageSize, const shared::RowSteps, const float, const Map, Map> reject_;
+  ocl::Kernel<const shared::ImageSize, const cl_int, const float, const Map, Map> reject_;
 };
 
 }  // namespace egosgm

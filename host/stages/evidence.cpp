@@ -53,7 +53,7 @@ void Evidence::operator()(const ocl::Buffer<cl_uint>& codes, const CoarseView* c
 }
 
 void Evidence::publish(const Map& disparity, const FlagMap& evidence, Map& confirmed, Views views, Views tracked) {
-  stage_.launch_pixels(publish_, views.count, views.row_steps, tracked.count == 1, disparity, evidence, confirmed);
+  stage_.launch_pixels(publish_, views.count, views.row_step, tracked.count == 1, disparity, evidence, confirmed);
 }
 
 }  // namespace egosgm

@@ -57,7 +57,7 @@ class Evidence {
   ocl::Kernel<const shared::ImageSize, const cl_int, const cl_int, const Map, Words, const Sums, ocl::Buffer<cl_int>,
               Map>
       gather_;
-  ocl::Kernel<const shared::ImageSize, const shared::RowSteps, const cl_int, const Map, const FlagMap, Map> publish_;
+  ocl::Kernel<const shared::ImageSize, const cl_int, const cl_int, const Map, const FlagMap, Map> publish_;
 };
 
 }  // namespace egosgm

@@ -103,9 +103,8 @@ void ForwardWarp::warp(const StereoMaps& belief, const FlagMap& evidence, const 
   Motion motion = current_from_previous;
   motion.covariance *= static_cast<double>(options_.motion_noise);
   shared::DisparityMotion left = disparity_motion(calibration_, motion, EGOSGM_LEFT);
-  left.row_step = views.row_steps.left;
   shared::DisparityMotion right = disparity_motion(calibration_, motion, EGOSGM_RIGHT);
-  right.row_step = views.row_steps.right;
+  left.row_step = right.row_step = views.row_step;
   if (bands_) {
     auto& [find_spans, splat_bands, spans] = *bands_;
     const int bands = (size.height + band_rows_ - 1) / band_rows_;

@@ -12,9 +12,9 @@ HoleFill::HoleFill(ocl::Context& context, shared::ImageSize size, const HoleFill
                    Map(context, ocl::Scratch::kOfStage1, 2 * pixel_count(size))) {}
 
 void HoleFill::fill(const StereoMaps& in, StereoMaps& out, FlagMap& hidden, Views views) {
-  stage_.launch_pixels(fill_rows_, views.count, views.row_steps, max_difference_px_, in.disparity, in.variance,
+  stage_.launch_pixels(fill_rows_, views.count, views.row_step, max_difference_px_, in.disparity, in.variance,
                        rows_filled_.disparity, rows_filled_.variance);
-  stage_.launch_pixels(fill_columns_, views.count, views.row_steps, max_difference_px_, rows_filled_.disparity,
+  stage_.launch_pixels(fill_columns_, views.count, views.row_step, max_difference_px_, rows_filled_.disparity,
                        rows_filled_.variance, out.disparity, out.variance, hidden);
 }
 

@@ -21,11 +21,11 @@ class HoleFill {
  private:
   ocl::Stage stage_;
   const float max_difference_px_;
-  ocl::Kernel<const shared::ImageSize, const shared::RowSteps, const float, const ocl::Buffer<float>,
-              const ocl::Buffer<float>, ocl::Buffer<float>, ocl::Buffer<float>>
+  ocl::Kernel<const shared::ImageSize, const cl_int, const float, const ocl::Buffer<float>, const ocl::Buffer<float>,
+              ocl::Buffer<float>, ocl::Buffer<float>>
       fill_rows_;
-  ocl::Kernel<const shared::ImageSize, const shared::RowSteps, const float, const ocl::Buffer<float>,
-              const ocl::Buffer<float>, ocl::Buffer<float>, ocl::Buffer<float>, FlagMap>
+  ocl::Kernel<const shared::ImageSize, const cl_int, const float, const ocl::Buffer<float>, const ocl::Buffer<float>,
+              ocl::Buffer<float>, ocl::Buffer<float>, FlagMap>
       fill_columns_;
   StereoMaps rows_filled_;
 };

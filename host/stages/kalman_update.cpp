@@ -19,7 +19,7 @@ KalmanUpdate::KalmanUpdate(ocl::Context& context, shared::ImageSize size, const 
                   .has_evidence = false,
                   .repeats = false,
                   .sees_again = false,
-                  .row_steps = {1, 1}},
+                  .row_step = 1},
       ask_neighbours_(options.ask_neighbours),
       blocks_(CoarseMatch::coarse_size(size)),
       sums_(context, 2 * static_cast<std::size_t>(EGOSGM_EVIDENCE_STRIDE(size.width)) * blocks_.height),
@@ -46,7 +46,7 @@ void KalmanUpdate::update(const FlagMap& hidden, const StereoMaps& predicted, co
   parameters.has_evidence = evidence != nullptr;
   parameters.repeats = evidence && evidence->repeats;
   parameters.sees_again = evidence && evidence->sees_again;
-  parameters.row_steps = views.row_steps;
+  parameters.row_step = views.row_step;
   stage_.launch(update_, ocl::every_pixels(stage_.enter(), stage_.size(), stage_.pixels(), views.count), parameters,
                 hidden, predicted.disparity, predicted.variance, measured.disparity, measured.variance,
                 evidence ? evidence->before : hidden, blocks.evidence, blocks.found, drifts_, updated.disparity,

@@ -92,13 +92,11 @@ struct Prediction {
 /// The views that a stage works on, and which of their rows.
 struct Views {
   int count = 2;
-  shared::RowSteps row_steps{1, 1};
+  cl_int row_step = 1;
 
   static const Views kLeft, kBoth;
-  friend bool operator==(const Views& a, const Views& b) {
-    return a.count == b.count && a.row_steps.left == b.row_steps.left && a.row_steps.right == b.row_steps.right;
-  }
+  friend bool operator==(const Views&, const Views&) = default;
 };
-inline constexpr Views Views::kLeft{1, {1, 1}}, Views::kBoth{2, {1, 1}};
+inline constexpr Views Views::kLeft{1}, Views::kBoth{2};
 
 }  // namespace egosgm

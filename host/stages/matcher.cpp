@@ -19,16 +19,16 @@ void Matcher::prepare(PixelType type) {
 }
 
 void Matcher::match(const FrameImages& images, const SearchBands& bands, StereoMaps& matched, Views views,
-                    shared::RowSteps coded) {
+                    cl_int coded) {
   banded_sgm_.match(inputs(images, bands, views, coded), matched, views);
 }
 
 void Matcher::reading_off(const FrameImages& images, const SearchBands& bands, StereoMaps& matched, Views views,
-                          shared::RowSteps coded) {
+                          cl_int coded) {
   banded_sgm_.reading_off(inputs(images, bands, views, coded), matched, views);
 }
 
-MatchInputs Matcher::inputs(const FrameImages& images, const SearchBands& bands, Views views, shared::RowSteps coded) {
+MatchInputs Matcher::inputs(const FrameImages& images, const SearchBands& bands, Views views, cl_int coded) {
   census_[images.type].encode(images.pixels, codes_, coded);
   step_penalties_[images.type].compute(images.pixels, penalties_, views);
   return {codes_, penalties_, bands};

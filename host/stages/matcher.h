@@ -27,17 +27,15 @@ class Matcher {
 
   /// See BandedSgm. `coded`: rows that get codes, those that are matched among them. REQUIRES: the images' type was
   /// prepared.
-  void match(const FrameImages& images, const SearchBands& bands, StereoMaps& matched, Views views,
-             shared::RowSteps coded = {1, 1});
-  void reading_off(const FrameImages& images, const SearchBands& bands, StereoMaps& matched, Views views,
-                   shared::RowSteps coded);
+  void match(const FrameImages& images, const SearchBands& bands, StereoMaps& matched, Views views, cl_int coded = 1);
+  void reading_off(const FrameImages& images, const SearchBands& bands, StereoMaps& matched, Views views, cl_int coded);
 
   const BandedSgm& banded_sgm() const { return banded_sgm_; }
   const ocl::Buffer<cl_uint>& codes() const { return codes_; }
   const ocl::Buffer<cl_uchar>& penalties() const { return penalties_; }
 
  private:
-  MatchInputs inputs(const FrameImages& images, const SearchBands& bands, Views views, shared::RowSteps coded);
+  MatchInputs inputs(const FrameImages& images, const SearchBands& bands, Views views, cl_int coded);
 
   OfEachType<Census> census_;
   OfEachType<StepPenalties> step_penalties_;

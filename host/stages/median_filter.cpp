@@ -9,11 +9,11 @@ MedianFilter::MedianFilter(ocl::Context& context, shared::ImageSize size, int pi
       filter_and_fill_(stage_, "filter_and_fill") {}
 
 void MedianFilter::filter(const Map& disparity, Map& filtered, Views views) {
-  stage_.launch_pixels(filter_, views.count, views.row_steps, disparity, filtered);
+  stage_.launch_pixels(filter_, views.count, views.row_step, disparity, filtered);
 }
 
 void MedianFilter::fill(const Map& disparity, Map& filtered, Map& variance, Views views) {
-  stage_.launch_pixels(filter_and_fill_, views.count, views.row_steps, disparity, filtered, variance);
+  stage_.launch_pixels(filter_and_fill_, views.count, views.row_step, disparity, filtered, variance);
 }
 
 }  // namespace egosgm

@@ -22,9 +22,8 @@ class MedianFilter {
 
  private:
   ocl::Stage stage_;
-  ocl::Kernel<const shared::ImageSize, const shared::RowSteps, const ocl::Buffer<float>, ocl::Buffer<float>> filter_;
-  ocl::Kernel<const shared::ImageSize, const shared::RowSteps, const ocl::Buffer<float>, ocl::Buffer<float>,
-              ocl::Buffer<float>>
+  ocl::Kernel<const shared::ImageSize, const cl_int, const ocl::Buffer<float>, ocl::Buffer<float>> filter_;
+  ocl::Kernel<const shared::ImageSize, const cl_int, const ocl::Buffer<float>, ocl::Buffer<float>, ocl::Buffer<float>>
       filter_and_fill_;
 };
 

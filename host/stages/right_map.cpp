@@ -19,10 +19,10 @@ RightMap::RightMap(ocl::Context& context, shared::ImageSize size, shared::Dispar
       decode_(stage_, "decode") {}
 
 void RightMap::complete(const StereoMaps& measured, float max_difference_px, StereoMaps& maps, bool makes_variance,
-                        shared::RowSteps row_steps) {
+                        cl_int row_step) {
   if (stage_.pixels() == 1) keys_.fill(stage_.enter(), 0);
-  stage_.launch_pixels(splat_, /*views=*/1, row_steps, min_disparity_, maps.disparity, keys_);
-  stage_.launch_pixels(decode_, /*views=*/1, row_steps, min_disparity_, max_difference_px, makes_variance, keys_,
+  stage_.launch_pixels(splat_, /*views=*/1, row_step, min_disparity_, maps.disparity, keys_);
+  stage_.launch_pixels(decode_, /*views=*/1, row_step, min_disparity_, max_difference_px, makes_variance, keys_,
                        measured.disparity, measured.variance, maps.disparity, maps.variance);
 }
 

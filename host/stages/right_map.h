@@ -18,18 +18,16 @@ class RightMap {
   /// than `max_difference_px` contradicts. The variances only where `makes_variance`. REQUIRES: no disparity lies more
   /// than half a pixel below the range.
   void complete(const StereoMaps& measured, float max_difference_px, StereoMaps& maps, bool makes_variance,
-                shared::RowSteps row_steps = {1, 1});
+                cl_int row_step = 1);
 
  private:
   ocl::Stage stage_;
   const cl_int min_disparity_;
   ocl::Buffer<cl_int> keys_;
-  ocl::Kernel<const shared::ImageSize, const shared::RowSteps, const cl_int, const ocl::Buffer<float>,
-              ocl::Buffer<cl_int>>
+  ocl::Kernel<const shared::ImageSize, const cl_int, const cl_int, const ocl::Buffer<float>, ocl::Buffer<cl_int>>
       splat_;
-  ocl::Kernel<const shared::ImageSize, const shared::RowSteps, const cl_int, const float, const cl_int,
-              const ocl::Buffer<cl_int>, const ocl::Buffer<float>, const ocl::Buffer<float>, ocl::Buffer<float>,
-              ocl::Buffer<float>>
+  ocl::Kernel<const shared::ImageSize, const cl_int, const cl_int, const float, const cl_int, const ocl::Buffer<cl_int>,
+              const ocl::Buffer<float>, const ocl::Buffer<float>, ocl::Buffer<float>, ocl::Buffer<float>>
       decode_;
 };
 

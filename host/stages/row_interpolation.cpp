@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/stages/row_interpolation.h"
 
-#include <algorithm>
-
 namespace egosgm {
 
 RowInterpolation::RowInterpolation(ocl::Context& context, shared::ImageSize size, int pixels)
@@ -10,8 +8,8 @@ RowInterpolation::RowInterpolation(ocl::Context& context, shared::ImageSize size
       interpolate_(stage_, "interpolate_rows") {}
 
 void RowInterpolation::interpolate(Map& disparity, Map& variance, Views views) {
-  if (std::max(views.row_steps.left, views.row_steps.right) == 1) return;
-  stage_.launch_pixels(interpolate_, views.count, views.row_steps, disparity, variance);
+  if (views.row_step == 1) return;
+  stage_.launch_pixels(interpolate_, views.count, views.row_step, disparity, variance);
 }
 
 }  // namespace egosgm

@@ -16,7 +16,7 @@ class RowInterpolation {
 
  private:
   ocl::Stage stage_;
-  ocl::Kernel<const shared::ImageSize, const shared::RowSteps, Map, Map> interpolate_;
+  ocl::Kernel<const shared::ImageSize, const cl_int, Map, Map> interpolate_;
 };
 
 }  // namespace egosgm

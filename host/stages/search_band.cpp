@@ -65,11 +65,11 @@ void SearchBand::narrow(const StereoMaps& predicted, const Map* coarse, SearchBa
   if (coarse)
     stage_.launch(gather_coarse_, ocl::every_pixel(context, blocks_, views.count), size, *coarse, coarse_ranges_);
   if (options_.from_neighbours)
-    stage_.launch(gather_blocks_, blocks, size, views.row_steps, predicted.disparity, block_ranges_);
+    stage_.launch(gather_blocks_, blocks, size, views.row_step, predicted.disparity, block_ranges_);
   stage_.launch(bands_of_blocks_, blocks, size, range_, options_.from_neighbours, options_.neighbour_margin_px,
                 options_.neighbour_min_count, options_.coarse_margin_px, block_ranges_, coarse ? coarse_ranges_ : none_,
                 found_, block_bands_);
-  stage_.launch_pixels(bands_of_pixels_, views.count, views.row_steps, range_, options_.sigmas,
+  stage_.launch_pixels(bands_of_pixels_, views.count, views.row_step, range_, options_.sigmas,
                        options_.min_half_width_px, predicted.disparity, predicted.variance,
                        options_.coarse_tolerance_px, options_.coarse_margin_px, found_, block_bands_, bands.bands,
                        bands.cell_offsets, bands.row_sums);
@@ -87,7 +87,7 @@ void SearchBand::full_range(const Map& predicted, SearchBands& bands, Views view
 }
 
 void SearchBand::sum_rows(const Map& predicted, SearchBands& bands, Views views) {
-  stage_.launch_rows(sum_rows_, views.count, views.row_steps, predicted, bands.bands, bands.cell_offsets,
+  stage_.launch_rows(sum_rows_, views.count, views.row_step, predicted, bands.bands, bands.cell_offsets,
                      bands.row_sums);
 }
 

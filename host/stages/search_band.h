@@ -54,17 +54,17 @@ class SearchBand {
   const SearchBandOptions options_;
   Ranges block_ranges_, coarse_ranges_, none_, found_;
   ocl::Buffer<shared::Band> block_bands_;
-  ocl::Kernel<const shared::ImageSize, const shared::RowSteps, Disparities, Ranges> gather_blocks_;
+  ocl::Kernel<const shared::ImageSize, const cl_int, Disparities, Ranges> gather_blocks_;
   ocl::Kernel<const shared::ImageSize, Disparities, Ranges> gather_coarse_;
   ocl::Kernel<const shared::ImageSize, const shared::DisparityRange, const cl_int, const float, const cl_int,
               const float, const Ranges, const Ranges, Ranges, ocl::Buffer<shared::Band>>
       bands_of_blocks_;
-  ocl::Kernel<const shared::ImageSize, const shared::RowSteps, const shared::DisparityRange, const float, const float,
+  ocl::Kernel<const shared::ImageSize, const cl_int, const shared::DisparityRange, const float, const float,
               Disparities, Disparities, const float, const float, const Ranges, const ocl::Buffer<shared::Band>,
               ocl::Buffer<shared::Band>, ocl::Buffer<cl_uint>, ocl::Buffer<shared::RowSum>>
       bands_of_pixels_;
-  ocl::Kernel<const shared::ImageSize, const shared::RowSteps, Disparities, const ocl::Buffer<shared::Band>,
-              ocl::Buffer<cl_uint>, ocl::Buffer<shared::RowSum>>
+  ocl::Kernel<const shared::ImageSize, const cl_int, Disparities, const ocl::Buffer<shared::Band>, ocl::Buffer<cl_uint>,
+              ocl::Buffer<shared::RowSum>>
       sum_rows_;
   ocl::Kernel<const shared::ImageSize, const shared::Band, ocl::Buffer<shared::Band>, ocl::Buffer<cl_uint>,
               ocl::Buffer<shared::RowSum>>

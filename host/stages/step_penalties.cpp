@@ -14,7 +14,7 @@ StepPenalties::StepPenalties(ocl::Context& context, shared::ImageSize size, Pixe
       penalties_(stage_, "penalties") {}
 
 void StepPenalties::compute(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uchar>& steps, Views views) {
-  stage_.launch_pixels(penalties_, views.count, views.row_steps, most_, least_, slope_, images, steps);
+  stage_.launch_pixels(penalties_, views.count, views.row_step, most_, least_, slope_, images, steps);
 }
 
 }  // namespace egosgm

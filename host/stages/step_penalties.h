@@ -24,7 +24,7 @@ class StepPenalties {
  private:
   ocl::Stage stage_;
   const cl_int most_, least_, slope_;
-  ocl::Kernel<const shared::ImageSize, const shared::RowSteps, const cl_int, const cl_int, const cl_int,
+  ocl::Kernel<const shared::ImageSize, const cl_int, const cl_int, const cl_int, const cl_int,
               const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>>
       penalties_;
 };

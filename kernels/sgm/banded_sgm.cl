@@ -311,8 +311,8 @@ ALWAYS_INLINE void sweep_view(const bool meets, const bool backward, const SgmPa
   sweep.disparities += not_matched;
   sweep.variances += not_matched;
   sweep.row_sums += (size_t)q.first_view * q.height;
-  sweep.row_step = row_step_of(q.first_view + sweep.view, q.row_steps);
-  sweep.rows = rows_of(q, q.first_view + sweep.view);
+  sweep.row_step = q.row_step;
+  sweep.rows = rows_of(q);
   sweep.slots += (size_t)(2 * sweep.view + backward) * SLOTS_OF(q) * SLOT + SLOT_PADDING;
   if (backward) {
     sweep_tiles(meets, true, q, &sweep, first_row, wave, tile_columns);

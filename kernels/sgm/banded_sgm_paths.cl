@@ -60,7 +60,7 @@ KERNEL __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void follow_pa
   const bool is_second = group >= groups_of_first;
   const int direction = pass + (is_second ? PATHS / 4 : 0);
   const int first_line = (is_second ? group - groups_of_first : group) * LINES;
-  const int rows = rows_of(q, view);
+  const int rows = rows_of(q);
   const Path path = path_of(q, direction, backward, view, line_of(q.width, rows, direction, first_line + line));
   const Pixels pixels = {(global const Code*)codes, penalties, bands, offsets};
   global uchar* const first = backward ? backward_first : forward_first;
@@ -146,7 +146,7 @@ KERNEL __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void find_winn
     global const uchar* backward_second, global float* disparities, global float* variances, global uint* ranks) {
   local uint minima[LINES][MINIMA];
   const int lane = get_local_id(0) % LANES, line = get_local_id(0) / LANES;
-  const int view = get_group_id(2), y = (int)get_group_id(1) * row_step_of(view, q.row_steps);
+  const int view = get_group_id(2), y = (int)get_group_id(1) * q.row_step;
   if (y >= q.height) return;
   find_winner(q, get_group_id(0) * LINES + line, y, view, lane, minima[line], codes, bands, offsets, forward_first,
               forward_second, backward_first, backward_second, disparities, variances, ranks);

@@ -68,14 +68,13 @@ static inline Line line_of(const int width, const int rows, const int direction,
 static inline Path path_of(const SgmParameters q, const int direction, const bool backward, const int view,
                            const Line line) {
   const int sign = backward ? -1 : 1, view_sign = view == EGOSGM_LEFT ? 1 : -1;
-  const int row_step = row_step_of(view, q.row_steps);
   const int stride = q.width + 2 * q.padding;
   Path path;
   path.length = line.length;
   path.x = backward ? q.width - 1 - line.x : line.x;
-  path.y = (backward ? rows_of(q, view) - 1 - line.y : line.y) * row_step;
+  path.y = (backward ? rows_of(q) - 1 - line.y : line.y) * q.row_step;
   path.x_step = direction == 1 ? 0 : direction == 3 ? -sign : sign;
-  path.y_step = direction == 0 ? 0 : sign * row_step;
+  path.y_step = direction == 0 ? 0 : sign * q.row_step;
   path.pixel = (uint)(view * q.height + path.y) * q.width + path.x;
   path.pixel_step = path.y_step * q.width + path.x_step;
   const int along = view == EGOSGM_LEFT ? path.x : q.width - 1 - path.x;
@@ -85,7 +84,7 @@ static inline Path path_of(const SgmParameters q, const int direction, const boo
   path.other_step = path.y_step * stride - view_sign * path.x_step;
   path.penalty_offset = backward ? -path.pixel_step : 0;
   path.direction = direction;
-  path.p1 = direction == 0 ? q.p1 : p1_across_rows(q.p1, row_step);
+  path.p1 = direction == 0 ? q.p1 : p1_across_rows(q.p1, q.row_step);
   return path;
 }
 

@@ -18,7 +18,7 @@ static inline Uints load_ranks(global const uint* row, const int x) {
 COMPILED_ONCE void read_off_row(const WorkItem at, const SgmParameters q, global const uint* ranks,
                                 global float* disparities, global float* variances) {
   const int y = at.y;
-  if (y % q.row_steps.left != 0) return;
+  if (y % q.row_step != 0) return;
   const size_t row = ((size_t)q.height + y) * q.width;
   global const uint* seen = ranks + (size_t)y * ((size_t)q.width + 2 * (size_t)q.padding) + q.padding;
   FOR_PIXELS(x, q.width) {

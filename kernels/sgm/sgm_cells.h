@@ -16,10 +16,7 @@
 #define NO_RANK 0xffff0000u  // and above: of no left pixel, or of a disparity that it does not search
 
 // The number of rows of a view that are matched.
-static inline int rows_of(const SgmParameters q, const int view) {
-  const int step = row_step_of(view, q.row_steps);
-  return (q.height + step - 1) / step;
-}
+static inline int rows_of(const SgmParameters q) { return (q.height + q.row_step - 1) / q.row_step; }
 
 // Disparity with its sub-pixel part, by a symmetric V through the winner and its neighbours, whose sums lie that much
 // above its own; 0 both where one is missing.

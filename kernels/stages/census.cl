@@ -81,11 +81,11 @@ static inline Code code_at(const int width, const Rows* rows, const int x, const
 #if PIXELS == 1
 
 // A work-item a code, those of the padding too: they are the border's.
-KERNEL void census(const ImageSize size, const RowSteps row_steps, const int padding, const int alike,
+KERNEL void census(const ImageSize size, const int row_step, const int padding, const int alike,
                    global const uchar* images, global uint* all_codes) {
   const int at = get_global_id(0), y = get_global_id(1), view = get_global_id(2);
   const int stride = size.width + 2 * padding;
-  if (at >= stride || y % row_step_of(view, row_steps) != 0) return;
+  if (at >= stride || y % row_step != 0) return;
 
   const size_t row = (size_t)view * size.height + y;
   global const Pixel* image = (global const Pixel*)images + (size_t)view * size.height * size.width;
@@ -132,10 +132,10 @@ static inline void write_codes_at(const Rows* rows, const int x, const int width
 #endif
 
 // A work-item a row and view.
-COMPILED_ONCE void census_row(const WorkItem at, const ImageSize size, const RowSteps row_steps, const int padding,
+COMPILED_ONCE void census_row(const WorkItem at, const ImageSize size, const int row_step, const int padding,
                               const int alike, global const uchar* images, global uint* all_codes) {
   const int y = at.x, view = at.y;
-  if (y >= size.height || y % row_step_of(view, row_steps) != 0) return;
+  if (y >= size.height || y % row_step != 0) return;
 
   const int width = size.width;
   const size_t stride = (size_t)width + 2 * (size_t)padding;
@@ -176,9 +176,9 @@ COMPILED_ONCE void census_row(const WorkItem at, const ImageSize size, const Row
   }
 }
 
-KERNEL void census(const ImageSize size, const RowSteps row_steps, const int padding, const int alike,
+KERNEL void census(const ImageSize size, const int row_step, const int padding, const int alike,
                    global const uchar* images, global uint* all_codes) {
-  census_row(THIS_WORK_ITEM, size, row_steps, padding, alike, images, all_codes);
+  census_row(THIS_WORK_ITEM, size, row_step, padding, alike, images, all_codes);
 }
 
 #endif

@@ -12,18 +12,18 @@ static inline Ints is_jump(const Floats d, const Floats near, const Floats far, 
   return (neighbour > INVALID) & (fabs(neighbour - d) > max_jump);
 }
 
-COMPILED_ONCE void reject_row(const WorkItem at, const ImageSize size, const RowSteps row_steps, const float max_jump,
+COMPILED_ONCE void reject_row(const WorkItem at, const ImageSize size, const int row_step, const float max_jump,
                               global const float* disparity, global float* kept) {
-  if (!has_row(at, row_steps)) return;
-  const int y = at.y, step = row_step_of(at.view, row_steps);
-  const int width = size.width, stride = step * width;
+  if (!has_row(at, row_step)) return;
+  const int y = at.y;
+  const int width = size.width, stride = row_step * width;
   const size_t row = ((size_t)at.view * size.height + y) * width;
   global const float* here = disparity + row;
   // Above and below the image, the pixel itself is read, which is no jump.
-  global const float* above = here - (y >= step ? stride : 0);
-  global const float* far_above = above - (y >= 2 * step ? stride : 0);
-  global const float* below = here + (y + step < size.height ? stride : 0);
-  global const float* far_below = below + (y + 2 * step < size.height ? stride : 0);
+  global const float* above = here - (y >= row_step ? stride : 0);
+  global const float* far_above = above - (y >= 2 * row_step ? stride : 0);
+  global const float* below = here + (y + row_step < size.height ? stride : 0);
+  global const float* far_below = below + (y + 2 * row_step < size.height ? stride : 0);
 
   FOR_PIXELS(x, width) {
     const Floats d = load_pixels(here, x, width);
@@ -36,7 +36,7 @@ COMPILED_ONCE void reject_row(const WorkItem at, const ImageSize size, const Row
   }
 }
 
-KERNEL void reject(const ImageSize size, const RowSteps row_steps, const float max_jump, global const float* disparity,
+KERNEL void reject(const ImageSize size, const int row_step, const float max_jump, global const float* disparity,
                    global float* kept) {
-  reject_row(THIS_WORK_ITEM, size, row_steps, max_jump, disparity, kept);
+  reject_row(THIS_WORK_ITEM, size, row_step, max_jump, disparity, kept);
 }

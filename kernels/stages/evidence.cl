@@ -289,9 +289,9 @@ KERNEL void gather_evidence(const ImageSize size, const int has_coarse, const in
 // Publishes of a belief the pixels with much evidence, and those with little within confirmed ones of the same surface.
 // Where the left view alone is tracked (by_left), a right pixel has the evidence of the left pixel that it sees, and
 // must be confirmed itself.
-COMPILED_ONCE void publish_row(const WorkItem at, const ImageSize size, const RowSteps row_steps, const int by_left,
+COMPILED_ONCE void publish_row(const WorkItem at, const ImageSize size, const int row_step, const int by_left,
                                global const float* disparity, global const uchar* evidence, global float* published) {
-  if (!has_row(at, row_steps)) return;
+  if (!has_row(at, row_step)) return;
   const int width = size.width;
   const size_t left_row = (size_t)at.y * width;
   const size_t row = (size_t)at.view * size.height * width + left_row;
@@ -317,7 +317,7 @@ COMPILED_ONCE void publish_row(const WorkItem at, const ImageSize size, const Ro
   }
 }
 
-KERNEL void publish_confirmed(const ImageSize size, const RowSteps row_steps, const int by_left,
+KERNEL void publish_confirmed(const ImageSize size, const int row_step, const int by_left,
                               global const float* disparity, global const uchar* evidence, global float* published) {
-  publish_row(THIS_WORK_ITEM, size, row_steps, by_left, disparity, evidence, published);
+  publish_row(THIS_WORK_ITEM, size, row_step, by_left, disparity, evidence, published);
 }

@@ -20,10 +20,10 @@ static inline Ints is_hidden(const Floats p, const Floats before, const Floats a
   return (p == hidden) | ((before == hidden) & (after == hidden));
 }
 
-COMPILED_ONCE void fill_row(const WorkItem at, const ImageSize size, const RowSteps row_steps, const float gamma,
+COMPILED_ONCE void fill_row(const WorkItem at, const ImageSize size, const int row_step, const float gamma,
                             global const float* disparity, global const float* variance, global float* filled_disparity,
                             global float* filled_variance) {
-  if (!has_row(at, row_steps)) return;
+  if (!has_row(at, row_step)) return;
   const int width = size.width;
   const size_t row = ((size_t)at.view * size.height + at.y) * width;
 
@@ -44,23 +44,23 @@ COMPILED_ONCE void fill_row(const WorkItem at, const ImageSize size, const RowSt
   }
 }
 
-KERNEL void fill_rows(const ImageSize size, const RowSteps row_steps, const float gamma, global const float* disparity,
+KERNEL void fill_rows(const ImageSize size, const int row_step, const float gamma, global const float* disparity,
                       global const float* variance, global float* filled_disparity, global float* filled_variance) {
-  fill_row(THIS_WORK_ITEM, size, row_steps, gamma, disparity, variance, filled_disparity, filled_variance);
+  fill_row(THIS_WORK_ITEM, size, row_step, gamma, disparity, variance, filled_disparity, filled_variance);
 }
 
 // `hidden`: 1 where a pixel is.
-COMPILED_ONCE void fill_columns_row(const WorkItem at, const ImageSize size, const RowSteps row_steps,
-                                    const float gamma, global const float* disparity, global const float* variance,
+COMPILED_ONCE void fill_columns_row(const WorkItem at, const ImageSize size, const int row_step, const float gamma,
+                                    global const float* disparity, global const float* variance,
                                     global float* filled_disparity, global float* filled_variance,
                                     global uchar* hidden) {
-  if (!has_row(at, row_steps)) return;
-  const int y = at.y, step = row_step_of(at.view, row_steps);
+  if (!has_row(at, row_step)) return;
+  const int y = at.y;
   const int width = size.width;
   const size_t row = ((size_t)at.view * size.height + y) * width;
   // At the border the row itself, whose pixels are valid or no neighbours.
-  const size_t row_above = y >= step ? row - (size_t)step * width : row;
-  const size_t row_below = y + step < size.height ? row + (size_t)step * width : row;
+  const size_t row_above = y >= row_step ? row - (size_t)row_step * width : row;
+  const size_t row_below = y + row_step < size.height ? row + (size_t)row_step * width : row;
 
   FOR_PIXELS(x, width) {
     const Floats d = load_pixels(disparity + row, x, width);
@@ -77,9 +77,9 @@ COMPILED_ONCE void fill_columns_row(const WorkItem at, const ImageSize size, con
   }
 }
 
-KERNEL void fill_columns(const ImageSize size, const RowSteps row_steps, const float gamma,
-                         global const float* disparity, global const float* variance, global float* filled_disparity,
-                         global float* filled_variance, global uchar* hidden) {
-  fill_columns_row(THIS_WORK_ITEM, size, row_steps, gamma, disparity, variance, filled_disparity, filled_variance,
+KERNEL void fill_columns(const ImageSize size, const int row_step, const float gamma, global const float* disparity,
+                         global const float* variance, global float* filled_disparity, global float* filled_variance,
+                         global uchar* hidden) {
+  fill_columns_row(THIS_WORK_ITEM, size, row_step, gamma, disparity, variance, filled_disparity, filled_variance,
                    hidden);
 }

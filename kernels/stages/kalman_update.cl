@@ -182,8 +182,7 @@ COMPILED_ONCE void update_row(const WorkItem at, const KalmanParameters q, globa
                               global const uchar* evidence_before, global const int* block_evidence,
                               global const float* found, global const float* drifts, global float* updated,
                               global float* updated_variance, global uchar* updated_doubtful, global uchar* evidence) {
-  if (!has_row(at, q.row_steps)) return;
-  const int step = row_step_of(at.view, q.row_steps);
+  if (!has_row(at, q.row_step)) return;
   const ImageSize size = {q.width, q.height};
   const int width = q.width;
   const int y = at.y;
@@ -205,7 +204,7 @@ COMPILED_ONCE void update_row(const WorkItem at, const KalmanParameters q, globa
       const Floats r = load_pixels(measured_variance + row, x, width);
       Verdict verdict = {(Ints)(EGOSGM_EVIDENCE_MOST), (Ints)(-1), (Ints)(-1)};
       if (q.has_evidence) {
-        verdict = judged(&q, moved_evidence(size, step, x, y, evidence_before + row),
+        verdict = judged(&q, moved_evidence(size, q.row_step, x, y, evidence_before + row),
                          OF_ITS_BLOCK(Ints, block_evidence + row_of_blocks, x),
                          OF_ITS_BLOCK(Floats, found + row_of_blocks, x), d, z, x, at.view);
       }

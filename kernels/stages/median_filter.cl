@@ -81,11 +81,11 @@ AT_EDGE void filter_block_at_edge(const int x, const bool fills, const int has_a
   filter_block(x, width, fills, has_above, has_below, stride, here, filtered, variance);
 }
 
-COMPILED_ONCE void filter_row(const WorkItem at, const bool fills, const ImageSize size, const RowSteps row_steps,
+COMPILED_ONCE void filter_row(const WorkItem at, const bool fills, const ImageSize size, const int row_step,
                               global const float* disparity, global float* filtered, global float* variance) {
-  if (!has_row(at, row_steps)) return;
-  const int step = row_step_of(at.view, row_steps), stride = step * size.width;
-  const int width = size.width, has_above = at.y >= step, has_below = at.y + step < size.height;
+  if (!has_row(at, row_step)) return;
+  const int stride = row_step * size.width;
+  const int width = size.width, has_above = at.y >= row_step, has_below = at.y + row_step < size.height;
   const size_t row = ((size_t)at.view * size.height + at.y) * width;
   FOR_PIXELS(x, width) {
     if (has_above && has_below && is_within(x, 1, width)) {
@@ -97,12 +97,11 @@ COMPILED_ONCE void filter_row(const WorkItem at, const bool fills, const ImageSi
   }
 }
 
-KERNEL void filter(const ImageSize size, const RowSteps row_steps, global const float* disparity,
-                   global float* filtered) {
-  filter_row(THIS_WORK_ITEM, false, size, row_steps, disparity, filtered, 0);
+KERNEL void filter(const ImageSize size, const int row_step, global const float* disparity, global float* filtered) {
+  filter_row(THIS_WORK_ITEM, false, size, row_step, disparity, filtered, 0);
 }
 
-KERNEL void filter_and_fill(const ImageSize size, const RowSteps row_steps, global const float* disparity,
+KERNEL void filter_and_fill(const ImageSize size, const int row_step, global const float* disparity,
                             global float* filtered, global float* variance) {
-  filter_row(THIS_WORK_ITEM, true, size, row_steps, disparity, filtered, variance);
+  filter_row(THIS_WORK_ITEM, true, size, row_step, disparity, filtered, variance);
 }

@@ -43,9 +43,9 @@ static inline Bids bids_of(const int width, const int min_disparity, const int x
 }
 
 // REQUIRES: on GPUs, keys of 0.
-COMPILED_ONCE void splat_row(const WorkItem at, const ImageSize size, const RowSteps row_steps, const int min_disparity,
+COMPILED_ONCE void splat_row(const WorkItem at, const ImageSize size, const int row_step, const int min_disparity,
                              global const float* disparity, global int* keys) {
-  if (!has_row(at, row_steps)) return;
+  if (!has_row(at, row_step)) return;
   const int y = at.y;
   const int width = size.width;
   const size_t row = (size_t)y * width;
@@ -77,17 +77,17 @@ COMPILED_ONCE void splat_row(const WorkItem at, const ImageSize size, const RowS
   }
 }
 
-KERNEL void splat(const ImageSize size, const RowSteps row_steps, const int min_disparity,
-                  global const float* disparity, global int* keys) {
-  splat_row(THIS_WORK_ITEM, size, row_steps, min_disparity, disparity, keys);
+KERNEL void splat(const ImageSize size, const int row_step, const int min_disparity, global const float* disparity,
+                  global int* keys) {
+  splat_row(THIS_WORK_ITEM, size, row_step, min_disparity, disparity, keys);
 }
 
 // makes_variance: else disparities only.
-COMPILED_ONCE void decode_row(const WorkItem at, const ImageSize size, const RowSteps row_steps,
-                              const int min_disparity, const float max_difference, const int makes_variance,
-                              global const int* keys, global const float* measured,
-                              global const float* measured_variance, global float* disparity, global float* variance) {
-  if (!has_row(at, row_steps)) return;
+COMPILED_ONCE void decode_row(const WorkItem at, const ImageSize size, const int row_step, const int min_disparity,
+                              const float max_difference, const int makes_variance, global const int* keys,
+                              global const float* measured, global const float* measured_variance,
+                              global float* disparity, global float* variance) {
+  if (!has_row(at, row_step)) return;
   const int y = at.y;
   const int width = size.width;
   const size_t row = (size_t)y * width;
@@ -122,9 +122,9 @@ COMPILED_ONCE void decode_row(const WorkItem at, const ImageSize size, const Row
   }
 }
 
-KERNEL void decode(const ImageSize size, const RowSteps row_steps, const int min_disparity, const float max_difference,
+KERNEL void decode(const ImageSize size, const int row_step, const int min_disparity, const float max_difference,
                    const int makes_variance, global const int* keys, global const float* measured,
                    global const float* measured_variance, global float* disparity, global float* variance) {
-  decode_row(THIS_WORK_ITEM, size, row_steps, min_disparity, max_difference, makes_variance, keys, measured,
+  decode_row(THIS_WORK_ITEM, size, row_step, min_disparity, max_difference, makes_variance, keys, measured,
              measured_variance, disparity, variance);
 }

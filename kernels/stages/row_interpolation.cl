@@ -7,9 +7,9 @@
 // lint: PIXELS=1
 // lint: PIXELS=16
 
-COMPILED_ONCE void interpolate_row(const WorkItem at, const ImageSize size, const RowSteps row_steps,
+COMPILED_ONCE void interpolate_row(const WorkItem at, const ImageSize size, const int row_step,
                                    global float* disparities, global float* variances) {
-  const int step = row_step_of(at.view, row_steps), own = at.y, above = own - own % step, next = above + step;
+  const int own = at.y, above = own - own % row_step, next = above + row_step;
   if (own == above) return;
   const int below = next < size.height ? next : above, width = size.width;
   const size_t first = (size_t)at.view * size.height * width, row = first + (size_t)own * width;
@@ -25,7 +25,7 @@ COMPILED_ONCE void interpolate_row(const WorkItem at, const ImageSize size, cons
   }
 }
 
-KERNEL void interpolate_rows(const ImageSize size, const RowSteps row_steps, global float* disparities,
+KERNEL void interpolate_rows(const ImageSize size, const int row_step, global float* disparities,
                              global float* variances) {
-  interpolate_row(THIS_WORK_ITEM, size, row_steps, disparities, variances);
+  interpolate_row(THIS_WORK_ITEM, size, row_step, disparities, variances);
 }

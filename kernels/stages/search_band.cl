@@ -20,18 +20,18 @@
 #define GATHERED_AT_ONCE (PIXELS == 1 ? 1 : 8)
 
 // Predictions count for the rows that the view lacks, too. A work-item BLOCKS blocks and view, or a row of them.
-KERNEL void gather_blocks(const ImageSize size, const RowSteps row_steps, global const float* disparity,
+KERNEL void gather_blocks(const ImageSize size, const int row_step, global const float* disparity,
                           global BlockRange* ranges) {
   const WorkItem at = THIS_WORK_ITEM;
   const ImageSize blocks = blocks_of(size);
   const int y = at.y;
   const int view = at.view;
-  const int end = min((y + 1) * EGOSGM_BLOCK, size.height), step = row_step_of(view, row_steps);
+  const int end = min((y + 1) * EGOSGM_BLOCK, size.height);
   for (int x = at.x * BLOCKS * GATHERED_AT_ONCE; x < blocks.width; x += at.items * BLOCKS * GATHERED_AT_ONCE) {
     Spans spans[GATHERED_AT_ONCE];
 #pragma unroll
     for (int i = 0; i < GATHERED_AT_ONCE; ++i) spans[i] = no_spans();
-    for (int row = y * EGOSGM_BLOCK; row < end; row += step) {
+    for (int row = y * EGOSGM_BLOCK; row < end; row += row_step) {
       global const float* of_row = disparity + ((size_t)view * size.height + row) * size.width;
 #pragma unroll
       for (int i = 0; i < GATHERED_AT_ONCE; ++i) {
@@ -41,7 +41,7 @@ KERNEL void gather_blocks(const ImageSize size, const RowSteps row_steps, global
     global BlockRange* to = ranges + index_of(blocks, view, x, y);
 #pragma unroll
     for (int i = 0; i < GATHERED_AT_ONCE; ++i) {
-      spans[i].count *= step;
+      spans[i].count *= row_step;
 #if BLOCKS == 1
       to[i] = range_of(spans[i].least, spans[i].most, spans[i].count);
 #else
@@ -228,7 +228,7 @@ COMPILED_ONCE void sum_row(const WorkItem at, const ImageSize size, global const
 #endif
 
 // Work-items that have a row alone sum it up, too. A work-item PIXELS pixels and view, or a row and view.
-COMPILED_ONCE void bands_of_pixels_row(const WorkItem at, const ImageSize size, const RowSteps row_steps,
+COMPILED_ONCE void bands_of_pixels_row(const WorkItem at, const ImageSize size, const int row_step,
                                        const DisparityRange range, const float sigmas, const float min_half_width,
                                        global const float* disparity, global const float* variance,
                                        const float coarse_tolerance, const float coarse_margin,
@@ -236,7 +236,7 @@ COMPILED_ONCE void bands_of_pixels_row(const WorkItem at, const ImageSize size, 
                                        global Band* bands, global uint* cell_offsets, global RowSum* row_sums) {
   const ImageSize blocks = blocks_of(size);
   const int y = at.y, view = at.view, width = size.width;
-  if (!has_row(at, row_steps)) return;
+  if (!has_row(at, row_step)) return;
   const size_t row = ((size_t)view * size.height + y) * width;
   const size_t row_of_blocks = index_of(blocks, view, 0, y / EGOSGM_BLOCK);
   FOR_CHUNKS(start, width) {
@@ -266,38 +266,39 @@ COMPILED_ONCE void bands_of_pixels_row(const WorkItem at, const ImageSize size, 
 #endif
 }
 
-KERNEL void bands_of_pixels(const ImageSize size, const RowSteps row_steps, const DisparityRange range,
-                            const float sigmas, const float min_half_width, global const float* disparity,
-                            global const float* variance, const float coarse_tolerance, const float coarse_margin,
-                            global const BlockRange* found, global const Band* block_bands, global Band* bands,
-                            global uint* cell_offsets, global RowSum* row_sums) {
-  bands_of_pixels_row(THIS_WORK_ITEM, size, row_steps, range, sigmas, min_half_width, disparity, variance,
+KERNEL void bands_of_pixels(const ImageSize size, const int row_step, const DisparityRange range, const float sigmas,
+                            const float min_half_width, global const float* disparity, global const float* variance,
+                            const float coarse_tolerance, const float coarse_margin, global const BlockRange* found,
+                            global const Band* block_bands, global Band* bands, global uint* cell_offsets,
+                            global RowSum* row_sums) {
+  bands_of_pixels_row(THIS_WORK_ITEM, size, row_step, range, sigmas, min_half_width, disparity, variance,
                       coarse_tolerance, coarse_margin, found, block_bands, bands, cell_offsets, row_sums);
 }
 
 #if ROW_GROUP == 1
 
 // Counts rows that were not banded pixel by pixel. A work-item a row and view.
-KERNEL void sum_rows(const ImageSize size, const RowSteps row_steps, global const float* disparity,
-                     global const Band* bands, global uint* cell_offsets, global RowSum* row_sums) {
+KERNEL void sum_rows(const ImageSize size, const int row_step, global const float* disparity, global const Band* bands,
+                     global uint* cell_offsets, global RowSum* row_sums) {
   const WorkItem at = THIS_WORK_ITEM;
-  if (has_row(at, row_steps)) sum_row(at, size, disparity, bands, cell_offsets, row_sums);
+  if (has_row(at, row_step)) sum_row(at, size, disparity, bands, cell_offsets, row_sums);
 }
 
 #else
 
 // Sums up each row: a work-group of ROW_GROUP a row and view goes over it in tiles, with an inclusive scan of a tile at
 // a time.
-KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(
-    const ImageSize size, const RowSteps row_steps, global const float* disparity, global const Band* bands,
-    global uint* cell_offsets, global RowSum* row_sums) {
+KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(const ImageSize size, const int row_step,
+                                                                            global const float* disparity,
+                                                                            global const Band* bands,
+                                                                            global uint* cell_offsets,
+                                                                            global RowSum* row_sums) {
   const int lane = get_local_id(0);
   const int y = get_global_id(1);
   const int view = get_global_id(2);
   const size_t row = (size_t)view * size.height + y;
-  const int width = has_row(THIS_WORK_ITEM, row_steps) ? size.width : 0;
-  uint chunks_before = 0;
-  uint predicted = 0;
+  const int width = has_row(THIS_WORK_ITEM, row_step) ? size.width : 0;
+  uint chunks_before = 0, predicted = 0;
   local uint chunks[ROW_GROUP];
   local uint totals[ROW_GROUP];
   for (int tile = 0; tile < width; tile += ROW_GROUP) {

@@ -35,16 +35,15 @@ static inline Ints penalty(const Ints most, const Ints least, const Ints slope, 
   return max(most - slope * max(p - q, q - p), least);
 }
 
-COMPILED_ONCE void penalties_row(const WorkItem at, const ImageSize size, const RowSteps row_steps, const int most,
+COMPILED_ONCE void penalties_row(const WorkItem at, const ImageSize size, const int row_step, const int most,
                                  const int least, const int slope, global const uchar* images, global uchar* steps) {
-  if (!has_row(at, row_steps)) return;
+  if (!has_row(at, row_step)) return;
   const int y = at.y;
   const int width = size.width;
   const size_t row = ((size_t)at.view * size.height + y) * width;
   // Outside the image there is no step: the border's pixel stands in.
   global const Pixel* here = (global const Pixel*)images + row;
-  const int step = row_step_of(at.view, row_steps);
-  global const Pixel* above = here - (y >= step ? step * width : 0);
+  global const Pixel* above = here - (y >= row_step ? row_step * width : 0);
 
   FOR_PIXELS(x, width) {
     const Ints grey = grey_at(here, x, width);
@@ -56,7 +55,7 @@ COMPILED_ONCE void penalties_row(const WorkItem at, const ImageSize size, const 
   }
 }
 
-KERNEL void penalties(const ImageSize size, const RowSteps row_steps, const int most, const int least, const int slope,
+KERNEL void penalties(const ImageSize size, const int row_step, const int most, const int least, const int slope,
                       global const uchar* images, global uchar* steps) {
-  penalties_row(THIS_WORK_ITEM, size, row_steps, most, least, slope, images, steps);
+  penalties_row(THIS_WORK_ITEM, size, row_step, most, least, slope, images, steps);
 }

@@ -49,7 +49,7 @@ struct View {
     return codes[static_cast<std::size_t>(std::clamp(y, 0, q.height - 1)) * q.width + std::clamp(x, 0, q.width - 1)];
   }
   /// Every so many-th row is matched.
-  int row_step() const { return shared::row_step_of(view, q.row_steps); }
+  int row_step() const { return q.row_step; }
   int rows() const { return (q.height + row_step() - 1) / row_step(); }
   /// P2 of the step from the pixel before, (dx, dy rows) back: that of the lower one of the two from its neighbour.
   int p2(int x, int y, int dx, int dy) const {
@@ -167,7 +167,7 @@ void read_off(const View& left, const shared::Band* bands, Cells& sums, testing:
 
 testing::HostMaps banded_sgm(shared::ImageSize size, shared::DisparityRange range, const BandedSgmOptions& options,
                              const std::vector<std::uint64_t> (&codes)[2], const std::vector<std::uint16_t>& grey,
-                             const std::vector<shared::Band>& bands, bool reads_off, shared::RowSteps row_steps) {
+                             const std::vector<shared::Band>& bands, bool reads_off, cl_int row_step) {
   const shared::SgmParameters q{.width = size.width,
                                 .height = size.height,
                                 .min_disparity = range.min,
@@ -179,7 +179,7 @@ testing::HostMaps banded_sgm(shared::ImageSize size, shared::DisparityRange rang
                                 .variance_per_step = options.variance_per_step_px2,
                                 .variance_per_square = options.variance_per_square_px2,
                                 .reads_off = reads_off,
-                                .row_steps = row_steps,
+                                .row_step = row_step,
                                 .first_view = 0};
   testing::HostMaps maps;
   for (int view = 0; view < 2; ++view) {
@@ -204,7 +204,7 @@ testing::HostMaps banded_sgm(shared::ImageSize size, shared::DisparityRange rang
       break;
     }
   }
-  return without_absent_rows(size, row_steps, maps);
+  return without_absent_rows(size, row_step, maps);
 }
 
 }  // namespace egosgm::reference

@@ -5,37 +5,23 @@
 #include <vector>
 
 namespace egosgm::reference {
-namespace {
-
-/// The rows of the other view that see what row y does.
-std::vector<int> rows_across(int y, int height, int step) {
-  const int above = y / step * step, below = above + step;
-  if (above == y || below >= height) return {above};
-  return {above, below};
-}
-
-}  // namespace
-
 testing::HostMaps consistency_check(shared::ImageSize size, float max_difference_px, bool keep_outside,
-                                    const testing::HostMaps& in, shared::RowSteps row_steps) {
+                                    const testing::HostMaps& in, cl_int row_step) {
   const std::size_t pixels = static_cast<std::size_t>(size.width) * size.height;
   testing::HostMaps out{std::vector<float>(2 * pixels, EGOSGM_INVALID_DISPARITY), in.variance, in.hidden};
   for (std::size_t i = 0; i < 2 * pixels; ++i) {
     const bool is_left = i < pixels;
-    const int own_step = is_left ? row_steps.left : row_steps.right;
     const int x = static_cast<int>(i % size.width), y = static_cast<int>(i % pixels / size.width);
     const float d = in.disparity[i];
-    if (d == EGOSGM_INVALID_DISPARITY || y % own_step != 0) continue;
+    if (d == EGOSGM_INVALID_DISPARITY || y % row_step != 0) continue;
     const float other_x = std::nearbyint(is_left ? static_cast<float>(x) - d : static_cast<float>(x) + d);
     bool keeps = false;
     if (!(other_x >= 0 && other_x < static_cast<float>(size.width))) {
       keeps = keep_outside;
     } else {
-      for (const int row : rows_across(y, size.height, is_left ? row_steps.right : row_steps.left)) {
-        const float other = in.disparity[(is_left ? pixels : 0) + static_cast<std::size_t>(row) * size.width +
-                                         static_cast<std::size_t>(other_x)];
-        keeps = keeps || (other != EGOSGM_INVALID_DISPARITY && std::abs(other - d) <= max_difference_px);
-      }
+      const float other = in.disparity[(is_left ? pixels : 0) + static_cast<std::size_t>(y) * size.width +
+                                       static_cast<std::size_t>(other_x)];
+      keeps = other != EGOSGM_INVALID_DISPARITY && std::abs(other - d) <= max_difference_px;
     }
     if (keeps) out.disparity[i] = d;
   }

@@ -35,8 +35,8 @@ testing::HostMaps reject_edges(shared::ImageSize size, float max_jump_px, const 
 }  // namespace
 
 testing::HostMaps edge_rejection(shared::ImageSize size, float max_jump_px, const testing::HostMaps& in,
-                                 shared::RowSteps row_steps) {
-  return of_present_rows(size, row_steps, in, [&](shared::ImageSize of, const testing::HostMaps& maps) {
+                                 cl_int row_step) {
+  return of_present_rows(size, row_step, in, [&](shared::ImageSize of, const testing::HostMaps& maps) {
     return reject_edges(of, max_jump_px, maps);
   });
 }

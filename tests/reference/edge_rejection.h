@@ -7,6 +7,6 @@
 namespace egosgm::reference {
 
 testing::HostMaps edge_rejection(shared::ImageSize size, float max_jump_px, const testing::HostMaps& in,
-                                 shared::RowSteps row_steps = {1, 1});
+                                 cl_int row_step = 1);
 
 }  // namespace egosgm::reference

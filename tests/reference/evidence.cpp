@@ -127,7 +127,7 @@ Verdict judge(shared::ImageSize size, float gate_px, const FrameEvidence& frame,
   };
   int before = moved(x, y);
   if (before == 0) before = std::min(moved(x - 1, y), moved(x + 1, y));
-  const int step = shared::row_step_of(view, frame.row_steps);
+  const int step = frame.row_step;
   if (before == 0) before = std::min(moved(x, y - step), moved(x, y + step));
   if (frame.repeats && is_valid(predicted)) return {before, true, false};
 

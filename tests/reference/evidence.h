@@ -36,7 +36,7 @@ struct FrameEvidence {
   std::vector<std::uint8_t> before;  // that moved with the prediction
   BlockEvidence blocks;
   bool repeats = false, sees_again = false;
-  shared::RowSteps row_steps{1, 1};
+  cl_int row_step = 1;
 };
 
 /// The evidence of a pixel after a frame [1/16 bit], whether it lives, and whether its measurement counts.

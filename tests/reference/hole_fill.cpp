@@ -45,8 +45,8 @@ testing::HostMaps fill_holes(shared::ImageSize size, float max_difference_px, co
 }  // namespace
 
 testing::HostMaps hole_fill(shared::ImageSize size, float max_difference_px, const testing::HostMaps& in,
-                            shared::RowSteps row_steps) {
-  return of_present_rows(size, row_steps, in, [&](shared::ImageSize of, const testing::HostMaps& maps) {
+                            cl_int row_step) {
+  return of_present_rows(size, row_step, in, [&](shared::ImageSize of, const testing::HostMaps& maps) {
     return fill_holes(of, max_difference_px, maps);
   });
 }

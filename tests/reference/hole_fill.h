@@ -7,6 +7,6 @@
 namespace egosgm::reference {
 
 testing::HostMaps hole_fill(shared::ImageSize size, float max_difference_px, const testing::HostMaps& in,
-                            shared::RowSteps row_steps = {1, 1});
+                            cl_int row_step = 1);
 
 }  // namespace egosgm::reference

@@ -39,9 +39,8 @@ testing::HostMaps filter(shared::ImageSize size, bool fill, const testing::HostM
 
 }  // namespace
 
-testing::HostMaps median_filter(shared::ImageSize size, bool fill, const testing::HostMaps& in,
-                                shared::RowSteps row_steps) {
-  return of_present_rows(size, row_steps, in,
+testing::HostMaps median_filter(shared::ImageSize size, bool fill, const testing::HostMaps& in, cl_int row_step) {
+  return of_present_rows(size, row_step, in,
                          [&](shared::ImageSize of, const testing::HostMaps& maps) { return filter(of, fill, maps); });
 }
 

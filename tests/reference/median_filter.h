@@ -6,7 +6,6 @@
 
 namespace egosgm::reference {
 
-testing::HostMaps median_filter(shared::ImageSize size, bool fill, const testing::HostMaps& in,
-                                shared::RowSteps row_steps = {1, 1});
+testing::HostMaps median_filter(shared::ImageSize size, bool fill, const testing::HostMaps& in, cl_int row_step = 1);
 
 }  // namespace egosgm::reference

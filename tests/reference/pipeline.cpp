@@ -70,7 +70,7 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
   const bool has_prediction = frame.unpredicted.empty();
   frame.tracked_views = options_.track_right ? 2 : 1;
   if (has_prediction) {
-    frame.matched_rows = frame.tracked_rows = {row_step(), row_step()};
+    frame.row_step = row_step();
   }
   if (has_prediction) predict(*motions, frame);
 
@@ -86,7 +86,7 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
   frame.result = fuses ? frame.updated : frame.passes.back().measured;
   frame.evidence = frame.fused.evidence;
   frame.output = frame.result.disparity;
-  const shared::RowSteps step = frame.tracked_rows;
+  const int step = frame.row_step;
   if (has_evidence()) {
     testing::HostMaps belief = frame.result;
     belief.evidence = frame.evidence;
@@ -130,7 +130,7 @@ std::vector<std::uint8_t> Pipeline::explain(const Images& images, const Frame& f
                   .code_padding = code_padding_,
                   .warped = frame.warped.disparity,
                   .hidden = frame.predicted.hidden,
-                  .row_step = frame.tracked_rows.left,
+                  .row_step = frame.row_step,
                   .consistent = pass.consistent.disparity,
                   .measured = pass.measured.disparity,
                   .belief = {frame.output, frame.result.variance},
@@ -140,9 +140,9 @@ std::vector<std::uint8_t> Pipeline::explain(const Images& images, const Frame& f
 }
 
 void Pipeline::predict(const ViewMotions& motions, Frame& frame) const {
-  const shared::RowSteps step = frame.tracked_rows;
+  const int step = frame.row_step;
   shared::DisparityMotion left = motions.left, right = motions.right;
-  left.row_step = step.left, right.row_step = step.right;
+  left.row_step = right.row_step = step;
   frame.warped = forward_warp(size_, range_, left, right, options_.forward_warp.process_noise_px2, *belief_);
   const float max_jump_px = options_.edge_rejection.max_jump_px;
   const ConsistencyCheckOptions& check = options_.consistency;
@@ -173,7 +173,7 @@ Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOff
   const BandedSgmOptions& sgm = options_.banded_sgm;
   const bool everything = frame.predicted.disparity.empty() || options_.search == SearchMode::kFull;
   const bool reads_off = !frame.predicted.disparity.empty() && !options_.track_right;
-  const shared::RowSteps step = frame.matched_rows;
+  const int step = frame.row_step;
   Pass pass;
   pass.images = resample(size_, known, images.greys);
   const bool fuses = !frame.predicted.disparity.empty() || has_evidence();
@@ -225,10 +225,10 @@ void Pipeline::update(const Images& images, bool stands, Frame& frame) const {
     evidence =
         FrameEvidence{has_prediction ? frame.warped.evidence : std::vector<std::uint8_t>(predicted.disparity.size(), 0),
                       block_evidence(options_.kalman_update.gate_px, pass.view_codes, coarse, predicted, pass.measured),
-                      images.greys == greys_, stands && coarse.has_value(), frame.tracked_rows};
+                      images.greys == greys_, stands && coarse.has_value(), frame.row_step};
     frame.block_evidence = evidence->blocks.evidence;
   }
-  const shared::RowSteps step = frame.tracked_rows;
+  const int step = frame.row_step;
   frame.fused = kalman_update(size_, options_.kalman_update, predicted, pass.measured, evidence ? &*evidence : nullptr);
   frame.fused = without_absent_rows(size_, step, frame.fused);
   frame.fused_smoothed = options_.median_filter.enabled ? median_filter(size_, true, frame.fused, step) : frame.fused;

@@ -44,7 +44,7 @@ struct Pass {
 struct Frame {
   std::string unpredicted;
   int tracked_views = 2;
-  shared::RowSteps tracked_rows{1, 1}, matched_rows{1, 1};
+  int row_step = 1;  // every so many-th row is matched and tracked
   testing::HostMaps warped, without_edges, filled, predicted;
   std::vector<Pass> passes;  // two where nothing was known of the vertical offset
   testing::HostMaps fused, fused_smoothed, fused_consistent, updated;

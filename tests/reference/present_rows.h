@@ -38,30 +38,26 @@ void place_rows(shared::ImageSize size, int view, int step, const std::vector<T>
 
 /// With `none` in the rows that are not there.
 template <typename T>
-std::vector<T> without_absent_rows(shared::ImageSize size, shared::RowSteps steps, std::vector<T> map, T none) {
+std::vector<T> without_absent_rows(shared::ImageSize size, int step, std::vector<T> map, T none) {
   for (const int view : {EGOSGM_LEFT, EGOSGM_RIGHT}) {
-    const int step = shared::row_step_of(view, steps);
     place_rows(size, view, step, present_rows(size, view, step, map), none, map);
   }
   return map;
 }
-inline testing::HostMaps without_absent_rows(shared::ImageSize size, shared::RowSteps steps,
-                                             const testing::HostMaps& maps) {
+inline testing::HostMaps without_absent_rows(shared::ImageSize size, int step, const testing::HostMaps& maps) {
   const auto flags = [&](const std::vector<std::uint8_t>& map) {
-    return without_absent_rows(size, steps, map, std::uint8_t{0});
+    return without_absent_rows(size, step, map, std::uint8_t{0});
   };
-  return {without_absent_rows(size, steps, maps.disparity, EGOSGM_INVALID_DISPARITY),
-          without_absent_rows(size, steps, maps.variance, 0.0f), flags(maps.hidden), flags(maps.doubtful),
+  return {without_absent_rows(size, step, maps.disparity, EGOSGM_INVALID_DISPARITY),
+          without_absent_rows(size, step, maps.variance, 0.0f), flags(maps.hidden), flags(maps.doubtful),
           flags(maps.evidence)};
 }
 
 /// `stage(size, maps)`, to which the next row is the next one that is there.
 template <typename Stage>
-testing::HostMaps of_present_rows(shared::ImageSize size, shared::RowSteps steps, const testing::HostMaps& in,
-                                  const Stage& stage) {
+testing::HostMaps of_present_rows(shared::ImageSize size, int step, const testing::HostMaps& in, const Stage& stage) {
   testing::HostMaps out = stage(size, in);
   for (const int view : {EGOSGM_LEFT, EGOSGM_RIGHT}) {
-    const int step = shared::row_step_of(view, steps);
     if (step == 1) continue;
     const auto rows_of = [&](const auto& map) { return present_rows(size, view, step, map); };
     const testing::HostMaps present = stage(

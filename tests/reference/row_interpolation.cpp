@@ -5,10 +5,10 @@
 
 namespace egosgm::reference {
 
-testing::HostMaps row_interpolation(shared::ImageSize size, shared::RowSteps row_steps, const testing::HostMaps& in) {
+testing::HostMaps row_interpolation(shared::ImageSize size, cl_int row_step, const testing::HostMaps& in) {
   testing::HostMaps maps = in;
   const auto fill = [&](int view, int x, int y) {
-    const int step = shared::row_step_of(view, row_steps), above = y - y % step, next = above + step;
+    const int step = row_step, above = y - y % step, next = above + step;
     const auto at = [&](int row) {
       return (static_cast<std::size_t>(view) * size.height + row) * size.width + static_cast<std::size_t>(x);
     };
@@ -27,7 +27,7 @@ testing::HostMaps row_interpolation(shared::ImageSize size, shared::RowSteps row
   };
   for (const int view : {EGOSGM_LEFT, EGOSGM_RIGHT}) {
     for (int y = 0; y < size.height; ++y) {
-      for (int x = 0; x < size.width && y % shared::row_step_of(view, row_steps) != 0; ++x) fill(view, x, y);
+      for (int x = 0; x < size.width && y % row_step != 0; ++x) fill(view, x, y);
     }
   }
   return maps;

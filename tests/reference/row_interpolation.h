@@ -7,6 +7,6 @@
 namespace egosgm::reference {
 
 /// Fills the rows of both views between those that are there.
-testing::HostMaps row_interpolation(shared::ImageSize size, shared::RowSteps row_steps, const testing::HostMaps& in);
+testing::HostMaps row_interpolation(shared::ImageSize size, cl_int row_step, const testing::HostMaps& in);
 
 }  // namespace egosgm::reference

@@ -64,7 +64,7 @@ std::pair<float, float> found_around(shared::ImageSize size, const std::vector<f
 struct PresentMap {
   shared::ImageSize size;
   const std::vector<float>& disparity;
-  shared::RowSteps row_steps;
+  cl_int row_step;
 };
 
 /// What is predicted in the blocks from (first_x, first_y) to (last_x, last_y).
@@ -74,7 +74,7 @@ struct Predicted {
 };
 Predicted predicted_in(const PresentMap& map, int view, int first_x, int first_y, int last_x, int last_y) {
   const shared::ImageSize size = map.size;
-  const int step = shared::row_step_of(view, map.row_steps);
+  const int step = map.row_step;
   Predicted found;
   for (int y = std::max(0, first_y * EGOSGM_BLOCK); y < std::min(size.height, (last_y + 1) * EGOSGM_BLOCK); y += step) {
     for (int x = std::max(0, first_x * EGOSGM_BLOCK); x < std::min(size.width, (last_x + 1) * EGOSGM_BLOCK); ++x) {
@@ -145,13 +145,12 @@ void sum_rows(shared::ImageSize size, const std::vector<float>& disparity, Searc
 }  // namespace
 
 SearchBands search_band(shared::ImageSize size, shared::DisparityRange range, const SearchBandOptions& options,
-                        const testing::HostMaps& predicted, const std::vector<float>& coarse,
-                        shared::RowSteps row_steps) {
+                        const testing::HostMaps& predicted, const std::vector<float>& coarse, cl_int row_step) {
   const int blocks_x = (size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
   const int blocks_y = (size.height + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
   std::vector<shared::Band> of_blocks;
   std::vector<std::pair<float, float>> found;
-  const PresentMap disparities{size, predicted.disparity, row_steps};
+  const PresentMap disparities{size, predicted.disparity, row_step};
   for (int view = 0; view < 2; ++view) {
     for (int y = 0; y < blocks_y; ++y) {
       for (int x = 0; x < blocks_x; ++x) {

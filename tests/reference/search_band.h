@@ -17,8 +17,7 @@ struct SearchBands {
 
 /// `coarse`: what reference::coarse_match gives.
 SearchBands search_band(shared::ImageSize size, shared::DisparityRange range, const SearchBandOptions& options,
-                        const testing::HostMaps& predicted, const std::vector<float>& coarse = {},
-                        shared::RowSteps row_steps = {1, 1});
+                        const testing::HostMaps& predicted, const std::vector<float>& coarse = {}, cl_int row_step = 1);
 SearchBands full_range(shared::ImageSize size, shared::DisparityRange range, const std::vector<float>& predicted = {});
 
 }  // namespace egosgm::reference

@@ -11,10 +11,9 @@ int step_penalty(const BandedSgmOptions& options, int p, int q) {
 }
 
 std::vector<std::uint8_t> step_penalties(shared::ImageSize size, const std::vector<std::uint16_t>& images, int bits,
-                                         const BandedSgmOptions& options, shared::RowSteps row_steps) {
+                                         const BandedSgmOptions& options, cl_int row_step) {
   std::vector<std::uint8_t> penalties;
   for (int view = 0; view < 2; ++view) {
-    const int row_step = shared::row_step_of(view, row_steps);
     const int steps[4][2] = {{-1, 0}, {0, -row_step}, {-1, -row_step}, {1, -row_step}};
     for (int y = 0; y < size.height; ++y) {
       for (int x = 0; x < size.width; ++x) {

@@ -31,7 +31,7 @@ struct Case {
   BandedSgm::Tile tile = {};
   bool reads_off = false;
   int patch = 1;  // pixels a side of what has one prediction
-  shared::RowSteps row_steps{1, 1};
+  cl_int row_step = 1;
 };
 
 std::string name(const ::testing::TestParamInfo<Case>& info) {
@@ -48,8 +48,7 @@ std::string name(const ::testing::TestParamInfo<Case>& info) {
   }
   if (c.tile.block_lanes > 0) text += "_blocks" + std::to_string(c.tile.block_lanes);
   if (c.reads_off) text += "_read_off";
-  if (c.row_steps.left > 1) text += "_rows" + std::to_string(c.row_steps.left);
-  if (c.row_steps.right > 1) text += "_right_rows" + std::to_string(c.row_steps.right);
+  if (c.row_step > 1) text += "_rows" + std::to_string(c.row_step);
   if (c.group) text += "_lanes" + std::to_string(c.group->lanes) + "_lines" + std::to_string(c.group->lines);
   return text;
 }
@@ -92,7 +91,7 @@ struct Match {
   std::vector<Stripe> stripes;
   shared::DisparityRange range;
   bool reads_off = false;
-  shared::RowSteps row_steps{1, 1};
+  cl_int row_step = 1;
   BandedSgmOptions options;
 };
 
@@ -118,15 +117,15 @@ Match match(const Case& c, int max_memory_mib = 0) {
     predicted.variance.write(context, maps.variance);
     SearchBand(context, c.size, c.range, {.min_half_width_px = 1}).narrow(predicted, {}, bands, Views::kBoth);
   }
-  const auto steps = reference::step_penalties(c.size, m.grey, 8, m.options, c.row_steps);
+  const auto steps = reference::step_penalties(c.size, m.grey, 8, m.options, c.row_step);
   const auto penalties = testing::on_device<cl_uchar>(context, {steps.begin(), steps.end()});
   const MatchInputs inputs{device_codes, penalties, bands};
   if (c.reads_off) sgm.prepare_reading_off();
-  c.reads_off ? sgm.reading_off(inputs, measured, {1, c.row_steps}) : sgm.match(inputs, measured, {2, c.row_steps});
+  c.reads_off ? sgm.reading_off(inputs, measured, {1, c.row_step}) : sgm.match(inputs, measured, {2, c.row_step});
 
   m.range = c.range;
   m.reads_off = c.reads_off;
-  m.row_steps = c.row_steps;
+  m.row_step = c.row_step;
   m.bands = bands.bands.read(context);
   m.measured = testing::download(context, measured);
   m.stripes = sgm.stripes();
@@ -151,8 +150,8 @@ TEST_P(BandedSgmTest, EqualsReference) {
   const Match m = match(c);
   ASSERT_EQ(m.stripes.size(), 1u);
   const auto expected =
-      reference::banded_sgm(c.size, m.range, m.options, m.codes, m.grey, m.bands, m.reads_off, m.row_steps);
-  EXPECT_TRUE(testing::same_maps(reference::without_absent_rows(c.size, m.row_steps, m.measured), expected, c.size));
+      reference::banded_sgm(c.size, m.range, m.options, m.codes, m.grey, m.bands, m.reads_off, m.row_step);
+  EXPECT_TRUE(testing::same_maps(reference::without_absent_rows(c.size, m.row_step, m.measured), expected, c.size));
 }
 
 /// `rows` rows of every one of `planes` planes, from `first` on.
@@ -175,7 +174,7 @@ testing::HostMaps stripe_by_stripe(const Match& m, shared::ImageSize size) {
     };
     const std::vector<std::uint64_t> codes[2] = {cut(m.codes[0], 1), cut(m.codes[1], 1)};
     const auto maps = reference::banded_sgm({size.width, stripe.rows}, m.range, m.options, codes, cut(m.grey, 2),
-                                            cut(m.bands, 2), m.reads_off, m.row_steps);
+                                            cut(m.bands, 2), m.reads_off, m.row_step);
     for (int view = 0; view < 2; ++view) {
       const std::ptrdiff_t kept = static_cast<std::ptrdiff_t>(stripe.kept_end - stripe.kept_begin) * size.width;
       const std::ptrdiff_t to = (static_cast<std::ptrdiff_t>(view) * size.height + stripe.kept_begin) * size.width;
@@ -205,12 +204,12 @@ TEST(BandedSgmStripes, EqualTheReferenceOfEach) {
                    .scheduling = scheduling,
                    .launches = reads_off ? BandedSgm::Launches::kWaves : BandedSgm::Launches::kSweepsOfAView,
                    .reads_off = reads_off,
-                   .row_steps = {2, 2}};
+                   .row_step = 2};
       const Match m = match(c, scheduling == Scheduling::kPaths ? 4 : 2);
       ASSERT_GE(m.stripes.size(), 3u);
       expect_few_rows(m.stripes, c.size.height);
       const auto present = [&](const testing::HostMaps& maps) {
-        return reference::without_absent_rows(c.size, m.row_steps, maps);
+        return reference::without_absent_rows(c.size, m.row_step, maps);
       };
       EXPECT_TRUE(testing::same_maps(present(m.measured), present(stripe_by_stripe(m, c.size)), c.size));
     }
@@ -315,10 +314,7 @@ std::vector<Case> changed(std::vector<Case> cases, Changes... changes) {
 
 void along_paths(Case& c) { c.scheduling = Scheduling::kPaths; }
 void read_off(Case& c) { c.reads_off = true; }
-void in_few_rows(Case& c) {
-  const int step = c.size.width % 2 == 0 ? 2 : 3;
-  c.row_steps = {c.reads_off || c.size.height % 2 == 1 ? step : 1, step};
-}
+void in_few_rows(Case& c) { c.row_step = c.size.width % 2 == 0 ? 2 : 3; }
 void whole_sweeps(Case& c) { c.launches = BandedSgm::Launches::kSweeps; }
 void view_by_view(Case& c) { c.launches = BandedSgm::Launches::kSweepsOfAView; }
 

@@ -44,7 +44,7 @@ TEST_P(ConsistencyCheckTest, EqualsReference) {
       testing::expect_reference(
           size, testing::earlier_maps(size),
           [&](int pixels, Views views) { return check(size, max_px, maps, outside, pixels, views); },
-          [&](shared::RowSteps steps) { return reference::consistency_check(size, max_px, keeps, maps, steps); });
+          [&](int step) { return reference::consistency_check(size, max_px, keeps, maps, step); });
     }
   }
 }

@@ -36,7 +36,7 @@ TEST_P(EdgeRejectionTest, EqualsReference) {
     testing::expect_reference(
         size, testing::earlier_maps(size),
         [&](int pixels, Views views) { return reject(size, max_jump_px, maps, pixels, views); },
-        [&](shared::RowSteps steps) { return reference::edge_rejection(size, max_jump_px, maps, steps); });
+        [&](int step) { return reference::edge_rejection(size, max_jump_px, maps, step); });
   }
 }
 

@@ -87,7 +87,7 @@ TEST_P(ForwardWarpTest, EqualsReference) {
   before.hidden.assign(before.disparity.size(), 0), before.evidence.assign(before.disparity.size(), 77);
   for (const shared::DisparityRange range : {shared::DisparityRange{0, 128}, {-20, 37}, {3, 1}}) {
     calibration.doffs_px = range.min < 0 ? 25.5 : 0;
-    // The noise of few steps makes many equal disparities, so that ties are met.
+    // The noise of few step makes many equal disparities, so that ties are met.
     testing::HostMaps belief = testing::random_maps(size, static_cast<float>(range.min) - 1,
                                                     static_cast<float>(range.min + range.count), 0.2, 12);
     for (float& d : belief.disparity) d = std::nearbyint(4 * d) / 4;
@@ -101,9 +101,9 @@ TEST_P(ForwardWarpTest, EqualsReference) {
       testing::expect_reference(
           size, before,
           [&](int pixels, Views views) { return warp(size, calibration, range, 0.25f, belief, motion, pixels, views); },
-          [&](shared::RowSteps steps) {
-            left.row_step = steps.left, right.row_step = steps.right;
-            return reference::without_absent_rows(size, steps,
+          [&](int step) {
+            left.row_step = right.row_step = step;
+            return reference::without_absent_rows(size, step,
                                                   reference::forward_warp(size, range, left, right, 0.25f, belief));
           });
     }

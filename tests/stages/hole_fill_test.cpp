@@ -59,7 +59,7 @@ TEST_P(HoleFillTest, EqualsReference) {
     SCOPED_TRACE(max_px);
     testing::expect_reference(
         size, before, [&](int pixels, Views views) { return fill(size, max_px, maps, pixels, views); },
-        [&](shared::RowSteps steps) { return reference::hole_fill(size, max_px, maps, steps); });
+        [&](int step) { return reference::hole_fill(size, max_px, maps, step); });
   }
 }
 

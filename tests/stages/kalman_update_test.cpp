@@ -117,10 +117,10 @@ TEST_P(KalmanUpdateTest, EqualsReferenceWithEvidence) {
     testing::expect_reference(
         size, before,
         [&](int pixels, Views views) { return update(size, {}, predicted, measured, pixels, views, &evidence); },
-        [&](shared::RowSteps steps) {
-          evidence.row_steps = steps;
+        [&](int step) {
+          evidence.row_step = step;
           const auto present = [&](const testing::HostMaps& maps) {
-            return reference::without_absent_rows(size, steps, maps);
+            return reference::without_absent_rows(size, step, maps);
           };
           return present(reference::kalman_update(size, {}, present(predicted), present(measured), &evidence));
         });

@@ -55,7 +55,7 @@ TEST_P(MedianFilterTest, EqualsReference) {
       SCOPED_TRACE(holes);
       testing::expect_reference(
           size, before, [&](int pixels, Views views) { return filter(size, maps, policy, pixels, views); },
-          [&](shared::RowSteps steps) { return reference::median_filter(size, policy == Holes::kFill, maps, steps); });
+          [&](int step) { return reference::median_filter(size, policy == Holes::kFill, maps, step); });
     }
   }
 }

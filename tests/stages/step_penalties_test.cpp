@@ -44,13 +44,13 @@ TEST_P(StepPenaltiesTest, EqualsReference) {
     const std::vector<std::uint8_t> of_all = reference::step_penalties(size, grey, bits, kOptions);
     const std::vector<std::uint8_t> before(StepPenalties::bytes(size), kUntouched);
     for (const int pixels : {1, 16}) {
-      for (const shared::RowSteps rows : {shared::RowSteps{1, 1}, {1, 2}, {2, 2}}) {
+      for (const int rows : {1, 2}) {
         const auto present = [&](const std::vector<std::uint8_t>& steps) {
           return reference::without_absent_rows(of_steps, rows, steps, std::uint8_t{0});
         };
         EXPECT_TRUE(testing::same_bits(present(penalties(size, grey, type, kOptions, pixels, {2, rows})),
                                        present(reference::step_penalties(size, grey, bits, kOptions, rows)), of_steps))
-            << "by " << pixels << ", row steps " << rows.left << rows.right;
+            << "by " << pixels << ", row step " << rows;
       }
       EXPECT_TRUE(testing::same_bits(penalties(size, grey, type, kOptions, pixels, Views::kLeft),
                                      testing::left_and_right(of_all, before), of_steps))
