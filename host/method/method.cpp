@@ -21,18 +21,18 @@ FrameResults Method::frame(const Plan& plan, const FrameImages& uploaded, const 
     in(Step::kRefineAlignment, [&] { refine(images, measured, offset, refined); });
   }
   in(Step::kFuse, [&] { fuse(plan, images, w.prediction, measured, w.fusion, after); });
-  Map result = after.maps.disparity;
+  StereoMaps result{after.maps.disparity, output.variance};
   in(Step::kPublish, [&] {
-    result = confirmed(plan, after, output.disparity);
-    publish_.complete_rows(plan, w.prediction, after.maps, measured, result);
+    result.disparity = confirmed(plan, after, output.disparity);
+    publish_.complete(plan, w.prediction, after.maps, measured, result);
     const Prediction* prediction = plan.predicts() ? &w.prediction : nullptr;
     publish_.write(plan,
                    {{images, match_.matcher().codes(), plan.grey_step, measured, match_.speckle_runs(plan)},
                     prediction,
-                    {after.maps, result, w.fusion.doubtful, evidence_of(after), w.fusion.evidence.evidence}},
-                   before, after, output.variance, w.published);
+                    {after.maps, result.disparity, w.fusion.doubtful, evidence_of(after), w.fusion.evidence.evidence}},
+                   before, after, w.published);
   });
-  return {{result, output.variance}, measured, offset, images};
+  return {result, measured, offset, images};
 }
 
 void Method::predict(const Plan& plan, const Belief& belief, Prediction& prediction) {

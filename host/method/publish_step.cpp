@@ -35,16 +35,18 @@ void PublishStep::prepare(PixelType type, const Wanted& wanted) {
   if (wanted.has(Output::kDynamic) && build_dynamic_map_ && !dynamic_map_) dynamic_map_.emplace(build_dynamic_map_());
 }
 
-void PublishStep::complete_rows(const Plan& plan, Prediction& prediction, StereoMaps& belief, StereoMaps& measured,
-                                Map& result) {
+void PublishStep::complete(const Plan& plan, Prediction& prediction, StereoMaps& belief, StereoMaps& measured,
+                           StereoMaps& result) {
   const Wanted& wanted = plan.wanted;
   const Views views = plan.published();
   const bool has_variance = wanted.has(Output::kVariance) || wanted.has(Output::kRightVariance);
-  row_interpolation_.interpolate(result, belief.variance, views);
-  if (has_variance || wanted.has(Output::kDynamic)) {
-    row_interpolation_.interpolate(belief.disparity, belief.variance, views);
+  if (has_variance) {
+    output_variance_.compute(result.disparity, belief, measured, result.variance,
+                             {wanted.has(Output::kRightVariance) ? 2 : 1, views.row_step});
   }
-  if (has_variance || wanted.has(Output::kMeasured) || wanted.has(Output::kMeasuredVariance)) {
+  row_interpolation_.interpolate(result.disparity, result.variance, views);
+  if (wanted.has(Output::kDynamic)) row_interpolation_.interpolate(belief.disparity, belief.variance, views);
+  if (wanted.has(Output::kMeasured) || wanted.has(Output::kMeasuredVariance)) {
     row_interpolation_.interpolate(measured.disparity, measured.variance, views);
   }
   if (plan.predicts() && (wanted.has(Output::kPredicted) || wanted.has(Output::kPredictedVariance))) {
@@ -53,12 +55,8 @@ void PublishStep::complete_rows(const Plan& plan, Prediction& prediction, Stereo
 }
 
 void PublishStep::write(const Plan& plan, const Reasons::Inputs& inputs, const Belief& before, Belief& after,
-                        Map& variance, Published& published) {
+                        Published& published) {
   const Wanted& wanted = plan.wanted;
-  if (wanted.has(Output::kVariance) || wanted.has(Output::kRightVariance)) {
-    output_variance_.compute(inputs.fused.output, inputs.fused.belief, inputs.match.measured, variance,
-                             wanted.has(Output::kRightVariance) ? Views::kBoth : Views::kLeft);
-  }
   if (wanted.has(Output::kReason))
     reasons_[inputs.match.images.type].explain(inputs, plan.tracked.row_step, published.reason);
   after.has_halved = wanted.has(Output::kDynamic) && dynamic_map_;

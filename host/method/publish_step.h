@@ -40,12 +40,12 @@ class PublishStep {
   /// Builds what is wanted of images of `type`.
   void prepare(PixelType type, const Wanted& wanted);
 
-  /// Fills the rows that are left out, in the maps that wanted outputs are made of. `result`: the disparities that are
-  /// published.
-  void complete_rows(const Plan& plan, Prediction& prediction, StereoMaps& belief, StereoMaps& measured, Map& result);
-  /// Writes what the plan wants. `before`: the belief of the frame before. `after`: this frame's; it keeps the left
-  /// image for the next frame's `dynamic` where this frame's is wanted. `variance`: [px^2] of what is published.
-  void write(const Plan& plan, const Reasons::Inputs& inputs, const Belief& before, Belief& after, Map& variance,
+  /// Writes the variance [px^2] of the disparities that are published, if it is wanted, and fills the rows that are
+  /// left out, in these and in the maps that wanted outputs are made of.
+  void complete(const Plan& plan, Prediction& prediction, StereoMaps& belief, StereoMaps& measured, StereoMaps& result);
+  /// Writes what else the plan wants. `before`: the belief of the frame before. `after`: this frame's; it keeps the
+  /// left image for the next frame's `dynamic` where this frame's is wanted.
+  void write(const Plan& plan, const Reasons::Inputs& inputs, const Belief& before, Belief& after,
              Published& published);
 
  private:

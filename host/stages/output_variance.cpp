@@ -17,12 +17,13 @@ OutputVariance::OutputVariance(ocl::Context& context, shared::ImageSize size, co
 
 void OutputVariance::compute(const Map& output, const StereoMaps& belief, const StereoMaps& measured, Map& variance,
                              Views views) {
-  if (!options_.enabled) return stage_.launch_pixels(keep_, views.count, output, belief.variance, variance);
-  stage_.launch_pixels(of_each_pixel_, views.count, output, belief.disparity, belief.variance, measured.disparity,
-                       measured.variance, variance, roughness_);
-  stage_.launch_pixels(row_means_, views.count, variance, roughness_, mean_variance_, mean_roughness_);
-  stage_.launch_pixels(combine_, views.count, options_.scale, options_.roughness_weight, options_.jump_weight, output,
-                       mean_variance_, mean_roughness_, variance);
+  if (!options_.enabled)
+    return stage_.launch_pixels(keep_, views.count, views.row_step, output, belief.variance, variance);
+  stage_.launch_pixels(of_each_pixel_, views.count, views.row_step, output, belief.disparity, belief.variance,
+                       measured.disparity, measured.variance, variance, roughness_);
+  stage_.launch_pixels(row_means_, views.count, views.row_step, variance, roughness_, mean_variance_, mean_roughness_);
+  stage_.launch_pixels(combine_, views.count, views.row_step, options_.scale, options_.roughness_weight,
+                       options_.jump_weight, output, mean_variance_, mean_roughness_, variance);
 }
 
 }  // namespace egosgm

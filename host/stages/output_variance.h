@@ -19,18 +19,20 @@ class OutputVariance {
   OutputVariance(ocl::Context& context, shared::ImageSize size, const OutputVarianceOptions& options, int pixels = 0);
 
   /// Writes the variance [px^2] of the disparities that are published of a belief; 0 where there is none. `measured`:
-  /// what the belief's frame measured; may be the belief.
+  /// what the belief's frame measured; may be the belief. Of `views`, all have the rows of row_step alone.
   void compute(const Map& output, const StereoMaps& belief, const StereoMaps& measured, Map& variance, Views views);
 
  private:
   ocl::Stage stage_;
   const OutputVarianceOptions options_;
   Map roughness_, mean_variance_, mean_roughness_;
-  ocl::Kernel<const shared::ImageSize, const Map, const Map, const Map, const Map, const Map, Map, Map> of_each_pixel_;
-  ocl::Kernel<const shared::ImageSize, const Map, const Map, Map, Map> row_means_;
-  ocl::Kernel<const shared::ImageSize, const float, const float, const float, const Map, const Map, const Map, Map>
+  ocl::Kernel<const shared::ImageSize, const cl_int, const Map, const Map, const Map, const Map, const Map, Map, Map>
+      of_each_pixel_;
+  ocl::Kernel<const shared::ImageSize, const cl_int, const Map, const Map, Map, Map> row_means_;
+  ocl::Kernel<const shared::ImageSize, const cl_int, const float, const float, const float, const Map, const Map,
+              const Map, Map>
       combine_;
-  ocl::Kernel<const shared::ImageSize, const Map, const Map, Map> keep_;
+  ocl::Kernel<const shared::ImageSize, const cl_int, const Map, const Map, Map> keep_;
 };
 
 }  // namespace egosgm

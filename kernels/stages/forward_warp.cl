@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Forward warp of both views' disparity maps by the camera's motion (eqs. 1-6), nearest surface first.
 //
-// Several sources may land on one target. The largest disparity wins, of equal ones the one with the largest variance,
-// so the result does not depend on the order in which they come; its evidence is the most that such a source has. What
-// came nearer than the range still hides what is behind it: such a target has no disparity, and is marked as hidden.
-// GPUs, a pixel a work-item: disparities bid by atomic maxima of keys that are ordered as they are, then variances do
-// among the sources that reached the winner. CPUs, where atomics are slow: a work-item owns a band of target rows and
-// looks through the source rows that reach into it.
+// A source lands between rows, and gives the row on which it is counted the disparity that its surface has there:
+// between its own and that of the row beside it. Several sources may land on one target. The largest disparity wins, of
+// equal ones the one with the largest variance, so the result does not depend on the order in which they come; its
+// evidence is the most that such a source has. What came nearer than the range still hides what is behind it: such a
+// target has no disparity, and is marked as hidden. GPUs, a pixel a work-item: disparities bid by atomic maxima of keys
+// that are ordered as they are, then variances do among the sources that reached the winner. CPUs, where atomics are
+// slow: a work-item owns a band of target rows and looks through the source rows that reach into it.
 #include "method.h"
 #include "pixels.h"
 
@@ -27,10 +28,17 @@ static inline Floats motion_variance(const DisparityMotion motion, const Floats 
   return q < zero ? zero : q;  // rounding
 }
 
-// Pixels x .. x + PIXELS - 1 of row y in the next frame.
+static inline Floats load_row(const ImageSize size, global const float* map, const int x, const int y) {
+  return y >= 0 && y < size.height ? load_pixels(map + (size_t)y * size.width, x, size.width) : INVALID;
+}
+
+// Pixels x .. x + PIXELS - 1 of row y in the next frame. `disparities`: of the view.
 static inline Moved move_pixels(const ImageSize size, const DisparityRange range, const DisparityMotion motion,
-                                const float process_noise, const int x, const int y, const Floats disparity,
+                                const float process_noise, const int x, const int y, global const float* disparities,
                                 const Floats variance) {
+  const Floats disparity = load_row(size, disparities, x, y);
+  const Floats above = load_row(size, disparities, x, y - motion.row_step);
+  const Floats below = load_row(size, disparities, x, y + motion.row_step);
   const Floats zero = 0.0f;
   const Floats one = 1.0f;
   const Floats least_ratio = EGOSGM_MIN_DEPTH_RATIO;
@@ -43,13 +51,17 @@ static inline Moved move_pixels(const ImageSize size, const DisparityRange range
   const Floats u = (motion.x[0] * wx + motion.x[1] * wy + motion.x[2] * wd + motion.x[3]) * phi;
   const Floats v = (motion.y[0] * wx + motion.y[1] * wy + motion.y[2] * wd + motion.y[3]) * phi;
   const Floats metric_disparity = wd * phi;
-
-  Moved moved;
-  moved.disparity = metric_disparity - motion.doffs + 0.0f;  // + 0: there is one zero only
   // Asked of the floats, with comparisons that NaN fails, before any of them becomes an integer.
   const Floats target_x = nearest(u + motion.cx);
   const float rows = motion.row_step;
-  const Floats target_y = rows * nearest((v + motion.cy) * (1.0f / rows));
+  const Floats row = (v + motion.cy) * (1.0f / rows), nearest_row = nearest(row);
+  const Floats target_y = rows * nearest_row;
+
+  const Floats beside = row < nearest_row ? below : above, change = beside - disparity;
+  const Ints is_one_surface = (beside > INVALID) & (fabs(change) <= (Floats)(EGOSGM_ROWS_AGREE_PX));
+  const Floats correction = is_one_surface ? fabs(nearest_row - row) * change : zero;
+  Moved moved;
+  moved.disparity = metric_disparity + correction - motion.doffs + 0.0f;  // + 0: there is one zero only
   moved.lands = (disparity > INVALID) & (w > least_ratio) & (target_x >= zero) & (target_x < (Floats)(size.width)) &
                 (target_y >= zero) & (target_y < (Floats)(size.height)) & (moved.disparity >= (Floats)(range.min));
   moved.x = INTS_OF_FLOATS(moved.lands ? target_x : zero);
@@ -81,7 +93,8 @@ KERNEL void move(const ImageSize size, const DisparityRange range, const Dispari
   if (x >= size.width) return;
   const size_t i = ((size_t)view * size.height + y) * size.width + x;
   const DisparityMotion motion = view == EGOSGM_LEFT ? left : right;
-  const Moved moved = move_pixels(size, range, motion, process_noise, x, y, disparity[i], variance[i]);
+  const Moved moved = move_pixels(size, range, motion, process_noise, x, y,
+                                  disparity + (size_t)view * size.height * size.width, variance[i]);
   landed[i] = moved.lands && y % motion.row_step == 0 ? moved.y * size.width + moved.x : -1;
   moved_key[i] = key_of(moved.disparity);
   moved_variance[i] = moved.variance;
@@ -222,9 +235,8 @@ COMPILED_ONCE void splat_bands_row(const WorkItem at, const ImageSize size, cons
       Ints targets[CHUNK];
       Floats disparities[CHUNK], variances[CHUNK];
       FOR_BLOCKS(x, i, start, width) {
-        const Floats d = load_pixels(disparity + row, x, width);
         const Floats p = load_pixels(variance + row, x, width);
-        const Moved moved = move_pixels(size, range, motion, process_noise, x, y, d, p);
+        const Moved moved = move_pixels(size, range, motion, process_noise, x, y, disparity + rows * width, p);
         const Ints lands = moved.lands & (moved.y >= (Ints)(first)) & (moved.y < (Ints)(end));
         targets[i] = lands ? (moved.y - first) * width + moved.x : (Ints)(-1);
         disparities[i] = moved.disparity;

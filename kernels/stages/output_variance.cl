@@ -33,17 +33,18 @@ static inline Floats blend(const Floats p, const Floats measured, const Floats r
   return sqrt(cut_r * sqrt(cut_r * cut(p, EGOSGM_MAX_MEAN_VARIANCE_PX2)));
 }
 
-// For each pixel: the variances' blend, and the sum of the horizontal and the vertical second difference. A pixel at
-// the image's edge is its own neighbour.
-COMPILED_ONCE void of_each_pixel_row(const WorkItem at, const ImageSize size, global const float* disparity,
-                                     global const float* belief, global const float* variance,
-                                     global const float* measured, global const float* measured_variance,
-                                     global float* blended, global float* roughness) {
-  const int y = at.y;
-  const int width = size.width;
+// For each pixel: the variances' blend, and the sum of the horizontal second difference and of what the vertical one is
+// of a row. A pixel at the image's edge is its own neighbour.
+COMPILED_ONCE void of_each_pixel_row(const WorkItem at, const ImageSize size, const int row_step,
+                                     global const float* disparity, global const float* belief,
+                                     global const float* variance, global const float* measured,
+                                     global const float* measured_variance, global float* blended,
+                                     global float* roughness) {
+  if (!has_row(at, row_step)) return;
+  const int y = at.y, width = size.width, stride = row_step * width;
   const size_t row = ((size_t)at.view * size.height + y) * width;
-  global const float* above = disparity + (y > 0 ? row - width : row);
-  global const float* below = disparity + (y + 1 < size.height ? row + width : row);
+  global const float* above = disparity + (y >= row_step ? row - stride : row);
+  global const float* below = disparity + (y + row_step < size.height ? row + stride : row);
   FOR_PIXELS(x, width) {
     const Ints at = x + LANE_INDICES;
     const Floats d = load_pixels(disparity + row, x, width);
@@ -51,23 +52,25 @@ COMPILED_ONCE void of_each_pixel_row(const WorkItem at, const ImageSize size, gl
     const Floats right = at < width - 1 ? load_pixels(disparity + row, x + 1, width) : d;
     const Floats across = second_difference(left, d, right);
     const Floats down = second_difference(load_pixels(above, x, width), d, load_pixels(below, x, width));
-    store_pixels(across + down, roughness + row, x, width);
+    store_pixels(across + down * (1.0f / row_step), roughness + row, x, width);
     const Floats p = if_valid(load_pixels(belief + row, x, width), load_pixels(variance + row, x, width));
     const Floats r = load_pixels(measured_variance + row, x, width);
     store_pixels(blend(p, load_pixels(measured + row, x, width), r), blended + row, x, width);
   }
 }
 
-KERNEL void of_each_pixel(const ImageSize size, global const float* disparity, global const float* belief,
-                          global const float* variance, global const float* measured,
+KERNEL void of_each_pixel(const ImageSize size, const int row_step, global const float* disparity,
+                          global const float* belief, global const float* variance, global const float* measured,
                           global const float* measured_variance, global float* blended, global float* roughness) {
-  of_each_pixel_row(THIS_WORK_ITEM, size, disparity, belief, variance, measured, measured_variance, blended, roughness);
+  of_each_pixel_row(THIS_WORK_ITEM, size, row_step, disparity, belief, variance, measured, measured_variance, blended,
+                    roughness);
 }
 
 // Means along the row: of the variances at every fourth pixel; of the roughness at every pixel.
-COMPILED_ONCE void row_means_row(const WorkItem at, const ImageSize size, global const float* variance,
-                                 global const float* roughness, global float* mean_variance,
-                                 global float* mean_roughness) {
+COMPILED_ONCE void row_means_row(const WorkItem at, const ImageSize size, const int row_step,
+                                 global const float* variance, global const float* roughness,
+                                 global float* mean_variance, global float* mean_roughness) {
+  if (!has_row(at, row_step)) return;
   const int width = size.width;
   const size_t row = ((size_t)at.view * size.height + at.y) * width;
   FOR_PIXELS(x, width) {
@@ -91,35 +94,36 @@ COMPILED_ONCE void row_means_row(const WorkItem at, const ImageSize size, global
   }
 }
 
-KERNEL void row_means(const ImageSize size, global const float* variance, global const float* roughness,
-                      global float* mean_variance, global float* mean_roughness) {
-  row_means_row(THIS_WORK_ITEM, size, variance, roughness, mean_variance, mean_roughness);
+KERNEL void row_means(const ImageSize size, const int row_step, global const float* variance,
+                      global const float* roughness, global float* mean_variance, global float* mean_roughness) {
+  row_means_row(THIS_WORK_ITEM, size, row_step, variance, roughness, mean_variance, mean_roughness);
 }
 
-// Mean of every STEP-th row within the radius, as far as the image reaches. The numbers are constants, so that loops
+// Mean of every STEP-th row within the radius, of those that are there. The numbers are constants, so that loops
 // can be unrolled.
-#define COLUMN_MEAN(NAME, RADIUS, STEP)                                                                 \
-  static inline Floats NAME(global const float* view, const ImageSize size, const int x, const int y) { \
-    Floats sum = 0.0f;                                                                                  \
-    float count = 0.0f;                                                                                 \
-    _Pragma("unroll") for (int i = -RADIUS; i <= RADIUS; i += STEP) {                                   \
-      if (y + i < 0 || y + i >= size.height) continue;                                                  \
-      sum += load_pixels(view + (size_t)(y + i) * size.width, x, size.width);                           \
-      count += 1.0f;                                                                                    \
-    }                                                                                                   \
-    return sum / count;                                                                                 \
+#define COLUMN_MEAN(NAME, RADIUS, STEP)                                                                      \
+  static inline Floats NAME(global const float* view, const ImageSize size, const int row_step, const int x, \
+                            const int y) {                                                                   \
+    Floats sum = 0.0f;                                                                                       \
+    float count = 0.0f;                                                                                      \
+    _Pragma("unroll") for (int i = -RADIUS; i <= RADIUS; i += STEP) {                                        \
+      if (i % row_step != 0 || y + i < 0 || y + i >= size.height) continue;                                  \
+      sum += load_pixels(view + (size_t)(y + i) * size.width, x, size.width);                                \
+      count += 1.0f;                                                                                         \
+    }                                                                                                        \
+    return sum / count;                                                                                      \
   }
 COLUMN_MEAN(column_mean_of_variance, EGOSGM_VARIANCE_RADIUS, EGOSGM_VARIANCE_STEP)
 COLUMN_MEAN(column_mean_of_roughness, EGOSGM_ROUGHNESS_RADIUS, 1)
 
 // The largest of the differences to the disparities EGOSGM_JUMP_DISTANCE pixels off.
-static inline Floats jump_beside(global const float* view, const ImageSize size, const int x, const int y,
-                                 const Floats d) {
+static inline Floats jump_beside(global const float* view, const ImageSize size, const int row_step, const int x,
+                                 const int y, const Floats d) {
   Floats most = 0.0f;
 #pragma unroll
   for (int i = -EGOSGM_JUMP_DISTANCE; i <= EGOSGM_JUMP_DISTANCE; i += EGOSGM_JUMP_DISTANCE) {
     const int v = y + i;
-    if (v < 0 || v >= size.height) continue;
+    if (i % row_step != 0 || v < 0 || v >= size.height) continue;
 #pragma unroll
     for (int u = -EGOSGM_JUMP_DISTANCE; u <= EGOSGM_JUMP_DISTANCE; u += EGOSGM_JUMP_DISTANCE) {
       const Floats other = load_pixels(view + (size_t)v * size.width, x + u, size.width);
@@ -137,10 +141,11 @@ static inline Floats calibrated(const Floats sum) {
   return right + EGOSGM_WRONG_SURFACE_PX2 * sqrt(sum) / (1.0f + EGOSGM_WRONG_SURFACE_HALF / (square * square * sum));
 }
 
-COMPILED_ONCE void combine_row(const WorkItem at, const ImageSize size, const float scale, const float roughness_weight,
-                               const float jump_weight, global const float* disparity,
+COMPILED_ONCE void combine_row(const WorkItem at, const ImageSize size, const int row_step, const float scale,
+                               const float roughness_weight, const float jump_weight, global const float* disparity,
                                global const float* mean_variance, global const float* mean_roughness,
                                global float* variance) {
+  if (!has_row(at, row_step)) return;
   const int y = at.y;
   const int width = size.width;
   const size_t view = (size_t)at.view * size.height * width;
@@ -148,11 +153,11 @@ COMPILED_ONCE void combine_row(const WorkItem at, const ImageSize size, const fl
   FOR_CHUNKS(start, width) {
     Floats sums[CHUNK], jumps[CHUNK];
     FOR_BLOCKS(x, i, start, width) {
-      jumps[i] = jump_beside(disparity + view, size, x, y, load_pixels(disparity + row, x, width));
+      jumps[i] = jump_beside(disparity + view, size, row_step, x, y, load_pixels(disparity + row, x, width));
     }
     FOR_BLOCKS(x, i, start, width) {
-      const Floats p = column_mean_of_variance(mean_variance + view, size, x, y);
-      const Floats r = column_mean_of_roughness(mean_roughness + view, size, x, y);
+      const Floats p = column_mean_of_variance(mean_variance + view, size, row_step, x, y);
+      const Floats r = column_mean_of_roughness(mean_roughness + view, size, row_step, x, y);
       const Floats j = jumps[i];
       sums[i] = scale * (p * sqrt(p)) + roughness_weight * (r * r) + jump_weight * (j * j);
     }
@@ -163,16 +168,17 @@ COMPILED_ONCE void combine_row(const WorkItem at, const ImageSize size, const fl
   }
 }
 
-KERNEL void combine(const ImageSize size, const float scale, const float roughness_weight, const float jump_weight,
-                    global const float* disparity, global const float* mean_variance,
+KERNEL void combine(const ImageSize size, const int row_step, const float scale, const float roughness_weight,
+                    const float jump_weight, global const float* disparity, global const float* mean_variance,
                     global const float* mean_roughness, global float* variance) {
-  combine_row(THIS_WORK_ITEM, size, scale, roughness_weight, jump_weight, disparity, mean_variance, mean_roughness,
-              variance);
+  combine_row(THIS_WORK_ITEM, size, row_step, scale, roughness_weight, jump_weight, disparity, mean_variance,
+              mean_roughness, variance);
 }
 
 // The filter's own variance.
-COMPILED_ONCE void keep_row(const WorkItem at, const ImageSize size, global const float* disparity,
+COMPILED_ONCE void keep_row(const WorkItem at, const ImageSize size, const int row_step, global const float* disparity,
                             global const float* variance, global float* kept) {
+  if (!has_row(at, row_step)) return;
   const int width = size.width;
   const size_t row = ((size_t)at.view * size.height + at.y) * width;
   FOR_PIXELS(x, width) {
@@ -181,7 +187,7 @@ COMPILED_ONCE void keep_row(const WorkItem at, const ImageSize size, global cons
   }
 }
 
-KERNEL void keep(const ImageSize size, global const float* disparity, global const float* variance,
+KERNEL void keep(const ImageSize size, const int row_step, global const float* disparity, global const float* variance,
                  global float* kept) {
-  keep_row(THIS_WORK_ITEM, size, disparity, variance, kept);
+  keep_row(THIS_WORK_ITEM, size, row_step, disparity, variance, kept);
 }

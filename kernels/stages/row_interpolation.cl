@@ -19,9 +19,11 @@ COMPILED_ONCE void interpolate_row(const WorkItem at, const ImageSize size, cons
     const Floats e = load_pixels(disparities + row_below, x, width), r = load_pixels(variances + row_below, x, width);
     const Ints is_above = is_valid(d), is_below = is_valid(e);
     const Ints agree = is_above & is_below & (fabs(d - e) <= (Floats)(EGOSGM_ROWS_AGREE_PX));
-    const Floats alone = is_above == is_below ? INVALID : is_above ? d : e;
-    store_pixels(agree ? 0.5f * (d + e) : alone, disparities + row, x, width);
-    store_pixels(agree ? 0.5f * (p + r) : is_above ? p : r, variances + row, x, width);
+    const Ints is_nothing = is_above == is_below;
+    const Floats disparity = is_nothing ? INVALID : is_above ? d : e;
+    const Floats variance = is_nothing ? (Floats)(0.0f) : is_above ? p : r;
+    store_pixels(agree ? 0.5f * (d + e) : disparity, disparities + row, x, width);
+    store_pixels(agree ? 0.5f * (p + r) : variance, variances + row, x, width);
   }
 }
 

@@ -20,6 +20,18 @@ float variance_of_motion(const shared::DisparityMotion& m, float u, float v, flo
   return q < 0 ? 0 : q;
 }
 
+// What its surface's disparity changes from `row`, on which a pixel of row y lands, to the nearest one, in steps of
+// rows.
+float to_nearest_row(shared::ImageSize size, const shared::DisparityMotion& m, int y, float row,
+                     const float* disparity) {
+  const float nearest = std::nearbyint(row);
+  const int step = row < nearest ? m.row_step : -m.row_step;
+  if (y + step < 0 || y + step >= size.height) return 0;
+  const float beside = disparity[static_cast<std::ptrdiff_t>(step) * size.width], change = beside - *disparity;
+  const bool is_one_surface = beside > EGOSGM_INVALID_DISPARITY && std::abs(change) <= kRowsAgreePx;
+  return is_one_surface ? std::abs(nearest - row) * change : 0;
+}
+
 void warp_view(shared::ImageSize size, shared::DisparityRange range, const shared::DisparityMotion& m,
                float process_noise_px2, const float* disparity, const float* variance, const std::uint8_t* evidence,
                float* out_disparity, float* out_variance, std::uint8_t* out_evidence, std::uint8_t* hidden) {
@@ -33,9 +45,9 @@ void warp_view(shared::ImageSize size, shared::DisparityRange range, const share
       if (!(w > kMinDepthRatio)) continue;
       const float phi = 1 / w;
       const float u = row_times(m.x, wx, wy, wd) * phi, v = row_times(m.y, wx, wy, wd) * phi, metric = wd * phi;
-      const float d = metric - m.doffs + 0.0f;
-      const float rows = static_cast<float>(m.row_step);
-      const float target_x = std::nearbyint(u + m.cx), target_y = rows * std::nearbyint((v + m.cy) / rows);
+      const float rows = static_cast<float>(m.row_step), row = (v + m.cy) * (1 / rows);
+      const float target_x = std::nearbyint(u + m.cx), target_y = rows * std::nearbyint(row);
+      const float d = metric + to_nearest_row(size, m, y, row, disparity + source) - m.doffs + 0.0f;
       if (!(target_x >= 0 && target_x < static_cast<float>(size.width))) continue;
       if (!(target_y >= 0 && target_y < static_cast<float>(size.height))) continue;
       if (!(d >= static_cast<float>(range.min))) continue;

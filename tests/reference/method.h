@@ -50,6 +50,7 @@ inline constexpr float kMinDepthRatio = 1e-6f;
 inline constexpr int kRepeatBits = 3;
 inline constexpr int kRepeatRadius = 8, kRepeatStep = 4;
 inline constexpr float kRightMapStepsPerPx = 65536.0f;
+inline constexpr float kRowsAgreePx = 3.0f;
 inline constexpr int kRoughnessRadius = 3;
 inline constexpr int kTextureRadius = 4;
 inline constexpr float kUncoveredJumpPx = 3.0f;

@@ -9,7 +9,8 @@
 
 namespace egosgm::reference {
 
-std::vector<float> output_variance(shared::ImageSize size, const OutputVarianceOptions& options,
+/// All maps have every row_step-th row alone, and so has the result.
+std::vector<float> output_variance(shared::ImageSize size, int row_step, const OutputVarianceOptions& options,
                                    const std::vector<float>& output, const testing::HostMaps& belief,
                                    const testing::HostMaps& measured);
 

@@ -91,16 +91,18 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
     testing::HostMaps belief = frame.result;
     belief.evidence = frame.evidence;
     frame.output = confirmed(size_, belief, !options_.track_right);
-    frame.output = row_interpolation(size_, step, {frame.output, frame.result.variance}).disparity;
   }
+  const testing::HostMaps output =
+      row_interpolation(size_, step,
+                        {frame.output, output_variance(size_, step, options_.output_variance, frame.output,
+                                                       frame.result, frame.passes.back().measured)});
+  frame.output = output.disparity;
+  frame.output_variance = output.variance;
   frame.dynamic.assign(static_cast<std::size_t>(size_.width) * size_.height, 0);
   if (has_prediction) {
     frame.dynamic = dynamic_map(size_, {greys_, bits_, belief_->disparity}, {images.greys, images.bits, frame.output},
                                 motions->left_back);
   }
-  frame.output_variance =
-      output_variance(size_, options_.output_variance, frame.output, row_interpolation(size_, step, frame.result),
-                      row_interpolation(size_, step, frame.passes.back().measured));
   frame.reasons = explain(images, frame);
   if (!options_.temporal) return frame;
   offset_ = frame.passes.back().offset;

@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "tests/reference/method.h"
+
 namespace egosgm::reference {
 
 testing::HostMaps row_interpolation(shared::ImageSize size, cl_int row_step, const testing::HostMaps& in) {
@@ -15,14 +17,14 @@ testing::HostMaps row_interpolation(shared::ImageSize size, cl_int row_step, con
     const std::size_t here = at(y), first = at(above), second = at(next < size.height ? next : above);
     const bool has_first = maps.disparity[first] != EGOSGM_INVALID_DISPARITY;
     const bool has_second = maps.disparity[second] != EGOSGM_INVALID_DISPARITY;
-    if (has_first && has_second && std::abs(maps.disparity[first] - maps.disparity[second]) <= 3) {
+    if (has_first && has_second && std::abs(maps.disparity[first] - maps.disparity[second]) <= kRowsAgreePx) {
       maps.disparity[here] = (maps.disparity[first] + maps.disparity[second]) / 2;
       maps.variance[here] = (maps.variance[first] + maps.variance[second]) / 2;
     } else {
       maps.disparity[here] = has_first == has_second ? EGOSGM_INVALID_DISPARITY
                              : has_first             ? maps.disparity[first]
                                                      : maps.disparity[second];
-      maps.variance[here] = has_first ? maps.variance[first] : maps.variance[second];
+      maps.variance[here] = has_first == has_second ? 0 : has_first ? maps.variance[first] : maps.variance[second];
     }
   };
   for (const int view : {EGOSGM_LEFT, EGOSGM_RIGHT}) {

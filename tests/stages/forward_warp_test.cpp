@@ -125,6 +125,29 @@ TEST(ForwardWarp, NearestSurfaceWins) {
   }
 }
 
+// Down by a tenth of the disparity, which is 10 + y / 5 on the upper 40 rows and 30 px more below them.
+TEST(ForwardWarp, WhatLandsBetweenRowsHasItsSurfacesDisparityThere) {
+  testing::HostMaps belief = testing::empty_maps(kSize);
+  const auto plane = [](double y) { return 10 + y / 5; };
+  for (int y = 0; y < kSize.height; ++y) {
+    for (int x = 0; x < kSize.width; ++x) {
+      belief.disparity[at(kSize, EGOSGM_LEFT, x, y)] = static_cast<float>(plane(y) + (y < 40 ? 0 : 30));
+    }
+  }
+  struct Case {
+    int step, last_row, lands_on;  // the last row above the jump
+  };
+  for (const auto& [step, last_row, lands_on] : {Case{1, 39, 41}, {2, 38, 40}, {3, 39, 42}}) {
+    const auto predicted = warp(kSize, kCalibration, kRange, 0, belief, translation(0, 0.05, 0), 0, {1, step});
+    const auto at_row = [&](int y) { return predicted.disparity[at(kSize, EGOSGM_LEFT, 50, y)]; };
+    for (int y = 6; y < 40; y += step) {
+      if (y == 27 && step != 2) continue;  // rows stretch, and none lands there
+      EXPECT_NEAR(at_row(y), plane((y - 1) / 1.02), 0.003 * step) << "row " << y << " of every " << step;
+    }
+    EXPECT_EQ(at_row(lands_on), static_cast<float>(plane(last_row))) << "another surface is no neighbour";
+  }
+}
+
 // Back by as much as the surface is away: x - cx and the disparity halve, so columns 53 .. 55 land on 52.
 TEST(ForwardWarp, OfEqualDisparitiesTheLeastCertainWins) {
   for (const int uncertain : {53, 54, 55}) {

@@ -8,6 +8,7 @@
 
 #include "tests/reference/method.h"
 #include "tests/reference/output_variance.h"
+#include "tests/reference/present_rows.h"
 #include "tests/support/stage_case.h"
 
 namespace egosgm {
@@ -49,14 +50,20 @@ TEST_P(OutputVarianceTest, EqualsReference) {
     std::vector<float> output = belief.disparity;
     for (std::size_t i = 0; i < output.size(); i += 3) output[i] = kNone;
     for (const OutputVarianceOptions& options : {OutputVarianceOptions{}, {.enabled = false}}) {
-      const std::vector<float> expected = reference::output_variance(size, options, output, belief, measured);
-      const std::vector<float> before(expected.size(), kUntouched);
-      for (const int pixels : {1, 16}) {
-        SCOPED_TRACE(std::to_string(holes) + " holes, by " + std::to_string(pixels));
-        EXPECT_TRUE(
-            testing::same_bits(output_variance(size, output, belief, measured, options, pixels), expected, size));
-        EXPECT_TRUE(testing::same_bits(output_variance(size, output, belief, measured, options, pixels, Views::kLeft),
-                                       testing::left_and_right(expected, before), size));
+      for (const int step : {1, 2}) {
+        const std::vector<float> expected = reference::output_variance(size, step, options, output, belief, measured);
+        const std::vector<float> before(expected.size(), kUntouched);
+        const auto present = [&](const std::vector<float>& map) {
+          return reference::without_absent_rows(size, step, map, kUntouched);
+        };
+        for (const int pixels : {1, 16}) {
+          SCOPED_TRACE(std::to_string(holes) + " holes, by " + std::to_string(pixels));
+          const auto of = [&](int views) {
+            return output_variance(size, output, belief, measured, options, pixels, {views, step});
+          };
+          EXPECT_TRUE(testing::same_bits(of(2), present(expected), size)) << "every " << step << " rows";
+          EXPECT_TRUE(testing::same_bits(of(1), testing::left_and_right(present(expected), before), size));
+        }
       }
     }
   }
