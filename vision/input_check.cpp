@@ -47,6 +47,17 @@ std::uint64_t digest_of(const Image& image) {
   return digest;
 }
 
+/// Whether all pixels have one value.
+bool is_plain(const Image& image) {
+  const std::size_t pixel = image.type.pixel_bytes();
+  const std::string_view first(image.row<char>(0), image.cols * pixel);
+  if (first.substr(pixel) != first.substr(0, first.size() - pixel)) return false;
+  for (int y = 1; y < image.rows; ++y) {
+    if (std::string_view(image.row<char>(y), first.size()) != first) return false;
+  }
+  return true;
+}
+
 /// `share`: of a side.
 bool is_within(double share, double most) { return std::abs(share - 0.5) < most; }
 
@@ -149,7 +160,9 @@ void InputCheck::add(const Image& left, const Image& right, const FrameReport& r
   const std::uint64_t digests[2] = {digest_of(left), digest_of(right)};
   for (const int side : {0, 1}) {
     const bool stands_still = digests[side] == seen_[side] && digests[1 - side] != seen_[1 - side];
-    if (frames_ > 0 && stands_still) ++frozen_[side];
+    const bool is_of_one_value = is_plain(side == 0 ? left : right);
+    if (is_of_one_value) ++plain_[side];
+    if (frames_ > 0 && stands_still && !is_of_one_value) ++frozen_[side];
   }
   if (digests[0] == digests[1]) ++same_;
   std::copy(std::begin(digests), std::end(digests), seen_);
@@ -178,6 +191,10 @@ std::string InputCheck::text() const {
   }
   if (same_ == frames_) append(text, "the left and the right images are the same (give those of both cameras)");
   for (const auto& [side, name] : {std::pair{0, "left"}, {1, "right"}}) {
+    if (plain_[side] > 0) {
+      append(text, formatted("the %s image is of one value in %zu frames (the camera was covered, dark or off)", name,
+                             plain_[side]));
+    }
     if (frozen_[side] == 0) continue;
     append(text,
            formatted("the %s image is that of the frame before in %zu frames, and the other one is not (these are "

@@ -32,8 +32,8 @@ EGOSGM_EXPORT std::optional<Suspicion> suspect_calibration(const Calibration& ca
 /// Checks a run's input once it is matched: a mean density below a half (maps of good input keep four
 /// fifths and more), no motion in most frames that have one before them, mosaics, images of 16 bits that hold 8 or
 /// whose bytes are exchanged, rows that are farther apart than the vertical alignment corrects, a camera that stands
-/// still while the other one does not, one camera's images on both sides, what is nearer than the range, a suspected
-/// calibration.
+/// still while the other one does not, images of one value, one camera's images on both sides, what is nearer than the
+/// range, a suspected calibration.
 class EGOSGM_EXPORT InputCheck {
  public:
   /// `calibration`: none where the images came without one, so that there is no motion either.
@@ -53,7 +53,8 @@ class EGOSGM_EXPORT InputCheck {
   double density_ = 0;          // of all frames, added up
   std::uint64_t seen_[2] = {};  // of the last images, left and right
   std::size_t frozen_[2] =
-      {};  // frames in which one camera's image is that of the frame before, and the other's is not
+      {};                      // frames in which one camera's image is that of the frame before, and the other's is not
+  std::size_t plain_[2] = {};  // frames in which a camera's image is of one value
   std::size_t frames_ = 0, without_motion_ = 0, narrow_ = 0, far_rows_ = 0, same_ = 0;
   std::size_t looks_ = 0, mosaics_ = 0, swapped_ = 0;
   std::optional<Clipped> clipped_;  // of the pair of which the range clips most

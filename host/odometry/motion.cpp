@@ -307,7 +307,7 @@ MotionEstimate refine_motion(const Calibration& calibration, const StereoOdometr
   if (std::abs(growth.unexplained_px) > most_px) {
     estimate.reason = format(
         "disparities changed by %+.2f px more than the motion explains (at most %.2f px): the features "
-        "move with the camera, as a projector's dots do",
+        "move with the camera, as a projector's dots do, or doffs_px is wrong",
         growth.unexplained_px, most_px);
     return estimate;
   }

@@ -37,6 +37,17 @@ def _expect_kinds(**given: Any) -> None:
             raise _egosgm.InvalidArgument(f"{name}: is a {type(value).__name__}: {choice}")
 
 
+_OWN = ("calibration", *_KINDS, "lag", "progress")
+_OF_PIPELINE = ("device", "cache", "constants")
+
+
+def _expect_names(options: Dict[str, Any]) -> None:
+    known = (*_OWN, *_OF_PIPELINE, *_egosgm.pipeline_options())
+    for name in options:
+        if name not in known:
+            raise _egosgm.InvalidArgument(f'no option named "{name}": choose from {", ".join(known)}')
+
+
 def _opened(paths: Sequence[str], frames: str, calibration: Any) -> Tuple[Any, Any]:
     """What one path or two name, as for `egosgm run`: a bag, videos, pictures or a folder; and the calibration that is left to be read."""
     path, right = (*paths, "")[:2]
@@ -114,6 +125,7 @@ class StereoVideo:
                  calibration: "_egosgm.Calibration | str | os.PathLike[str] | None" = None, *, frames: str = "", motion: bool = True,
                  outputs: Union[str, Sequence[str]] = ("disparity", "variance"), odometry: Optional[Dict[str, Any]] = None, lag: int = 1,
                  progress: Optional[bool] = None, objects: bool = False, **options: Any) -> None:
+        _expect_names(options)
         _expect_kinds(frames=frames, motion=motion, objects=objects, outputs=outputs, odometry=odometry)
         paths = [source] if isinstance(source, (str, os.PathLike)) else source if isinstance(source, (tuple, list)) and len(source) == 2 else []
         if paths and all(isinstance(path, (str, os.PathLike)) for path in paths):

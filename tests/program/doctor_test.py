@@ -117,6 +117,9 @@ class Doctor(InputTest):
             self.assertIn("of nearly one tone", found["images"]["text"])
             self.assertNotIn("moments", found)
         self.assertIn("in 2 of 4 pairs that were looked at", found["images"]["text"])
+        said = self.said_by_run(street)
+        self.assertIn("the right image is of one value in 2 frames", said)
+        self.assertNotIn("that of the frame before", said)
 
     def test_pairs_that_differ_from_each_other(self):
         swapped, loose = self.broken_street(), self.broken_street()
@@ -203,6 +206,22 @@ class Doctor(InputTest):
                     (street / f"image_{side}/{i:06d}.png").rename(street / f"image_{side}/{i - lag:06d}.png")
             (street / "times.txt").unlink()
             self.assertIn(f"the {late} images are {words} late", self.assert_only_problem("moments", street)["text"])
+
+    def test_a_camera_whose_images_are_in_reversed_order(self):
+        street, frames = self.new_folder() / "street", 6
+        self.assert_works("synth", "--out", street, "--frames", frames, "--width", WIDTH, "--height", HEIGHT, "--seed", 7)
+        (street / "image_1").rename(street / "reversed")
+        (street / "image_1").mkdir()
+        for i in range(frames):
+            (street / f"reversed/{i:06d}.png").rename(street / f"image_1/{frames - 1 - i:06d}.png")
+        self.assertIn("in reversed order", self.assert_only_problem("moments", street)["text"])
+
+    def test_a_right_image_that_is_the_left_one_moved(self):
+        for shift in (9, -6):
+            street = self.broken_street()
+            for file in (street / "image_0").iterdir():
+                write_grey(street / "image_1" / file.name, numpy.roll(read_grey(file), -shift, 1))
+            self.assertIn(f"the left ones, moved by {shift} px", self.assert_only_problem("matches", street)["text"])
 
     def test_rows_of_two_moments(self):
         street = self.broken_street()

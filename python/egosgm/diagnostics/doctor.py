@@ -194,6 +194,11 @@ def _moments(pairs: Dict[int, _Pair], places: Sequence[int]) -> List[Finding]:
         late = [(float(np.median([_spread_px(*views) for views in pairing])), lag, name) for lag, later in enumerate(laters, 1) if later
                 for name, pairing in (("right", [(a.left, b.right) for a, b in later]), ("left", [(b.left, a.right) for a, b in later]))]
         spread, lag, name = min(late)
+        ends = [pairs[place] for place in (places[0], places[-1]) if place in pairs]
+        turned = float(np.median([_spread_px(a.left, b.right) for a, b in zip(ends, ends[::-1])])) if len(ends) == 2 and places[-1] > 2 * _MOST_LATE else math.inf
+        if turned < min(0.5 * own, _MOST_PAIRED_PX, spread):
+            return [Finding("problem", "moments", f"one camera's images are in reversed order: so paired, first and last rows agree within {turned:.2f} px, as they are within "
+                            f"{own:.2f} px", "sort the images of both cameras by the time they were taken")]
         if spread < min(0.5 * own, _MOST_PAIRED_PX):
             return [Finding("problem", "moments", f"the {name} images are {'a frame' if lag == 1 else f'{lag} frames'} late: so paired, rows agree within {spread:.2f} px, as they "
                             f"are within {own:.2f} px", f"leave out the first {counted(lag, 'image')} of that camera, and as many last ones of the other")]

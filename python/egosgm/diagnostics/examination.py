@@ -119,13 +119,24 @@ def _slopes(places: NDArray[np.float64], errors: NDArray[np.float64]) -> str:
     return f", {fit[1]:+.2f} px from left to right, {fit[2]:+.2f} px from top to bottom"
 
 
+def _copied_by(left: NDArray[Any], right: NDArray[Any], matches: NDArray[np.float32]) -> Optional[int]:
+    """By how many columns the right image is the left one, moved; None where it is an image of its own."""
+    if np.array_equal(left, right):
+        return 0
+    shift = round(float(np.median(matches[:, 0] - matches[:, 2]))) if len(matches) else 0
+    width = left.shape[1] - abs(shift)
+    of_left, of_right = (image[:, start:start + width] for image, start in ((left, max(shift, 0)), (right, max(-shift, 0))))
+    return shift if shift and 2 * width > left.shape[1] and np.array_equal(of_left, of_right) else None
+
+
 class Examination:
     """It looks at a few pairs, however they came: add() them, then ask for findings()."""
 
     def __init__(self, calibration: Optional[_egosgm.Calibration], least: int, end: int) -> None:
         """calibration: None where the pairs have none. The range of disparities that is to be searched: [least, end)."""
         self._calibration, self._least, self._end = calibration, least, end
-        self._pairs = self._narrow = self._equal = 0
+        self._pairs = self._narrow = 0
+        self._copies: List[int] = []
         self._width = self._height = self._bits = 0
         self._brightness = np.zeros(2)
         self._contrasts: List[float] = []
@@ -142,7 +153,8 @@ class Examination:
         self._bits = 8 * left.dtype.itemsize
         self._pairs += 1
         self._narrow += int(left.dtype == np.uint16 and max(int(left.max()), int(right.max())) < 256)
-        self._equal += int(np.array_equal(left, right))
+        copied_by = _copied_by(left, right, matches)
+        self._copies += [] if copied_by is None else [copied_by]
         greys = _egosgm._grey_bytes(left, right)
         self._contrasts.append(min(float(np.ptp(np.quantile(image, (0.01, 0.99)))) for image in greys))
         self._levels = max(self._levels, *(np.count_nonzero(np.bincount(image.ravel())) for image in greys))
@@ -167,8 +179,9 @@ class Examination:
         matches = np.concatenate(self._matches)
         if self.is_too_small() or not self._has_contrast() or self._levels < _FEWEST_LEVELS or 2 * self._swapped > self._pairs:  # nothing else can be told
             return found
-        if self._equal == self._pairs:
-            return [*found, Finding("problem", "matches", "the left and the right images are the same", "give the images of both cameras")]
+        if len(self._copies) == self._pairs:
+            what = f"the right images are the left ones, moved by {self._copies[0]} px" if any(self._copies) else "the left and the right images are the same"
+            return [*found, Finding("problem", "matches", what, "give the images of both cameras")]
         coarse = np.concatenate(self._coarse)
         is_sure = len(coarse) >= _FEWEST_COARSE * self._coarse_pixels
         change = self._change() if len(coarse) < _USUAL_COARSE * self._coarse_pixels else ""
