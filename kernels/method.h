@@ -37,11 +37,12 @@
 #define EGOSGM_FAR_CONTROL 14
 #define EGOSGM_COARSE_CONTROLS \
   { -19, -14, -10, -7, 7, 10, 14, 19 }
-// Every second row of a block is asked, as the codes of neighbouring rows are alike.
-#define EGOSGM_EVIDENCE_ROW_STEP 2
-// The window, in blocks to all sides; half of a window counts with more than so many pixels in it, a quarter.
+// The row in the middle of a block is asked, as the codes of neighbouring rows are alike. A pixel of it without a
+// disparity has no evidence; one that is asked counts as much as so many of these.
+#define EGOSGM_EVIDENCE_WEIGHT 4
+// The window, in blocks to all sides; half of a window counts with more than half of its pixels in it, so weighted.
 #define EGOSGM_EVIDENCE_RADIUS 2
-#define EGOSGM_EVIDENCE_LEAST_COUNT 30
+#define EGOSGM_EVIDENCE_LEAST_COUNT (30 * EGOSGM_EVIDENCE_WEIGHT)
 // Rows of what is known of blocks begin at multiples of what a work-item reads of them.
 #define EGOSGM_EVIDENCE_STRIDE(width) (((width) + 15) / 16 * (16 / EGOSGM_COARSE))
 // The surface of a block: blocks whose grey values at a quarter of the resolution differ from its own by
@@ -51,10 +52,10 @@
 #define EGOSGM_ALIKE_LEAST 128
 #define EGOSGM_ALIKE_LEAST_BITS 12
 // A pixel's evidence is a sum over frames, at most MOST: of what it was, so many 64ths are kept, and a frame adds what
-// its images say, less what noise must not reach. What was chosen in this frame alone, and not by the coarse match too,
-// has that much less, as the best of many is better than chance. Below 0, the pixel dies; it is confirmed from
-// CONFIRMED on, and given out by itself from TRUSTED on.
-// A match outside of the other image cannot be asked: so many 64ths of its evidence are kept.
+// its images say, less what noise must not reach, or twice that where the coarse match contradicts it. What was chosen
+// in this frame alone, and not by the coarse match too, has OF_CHOICE less, as the best of many is better than chance.
+// Below 0, the pixel dies; it is confirmed from CONFIRMED on, and given out by itself from TRUSTED on. A match outside
+// of the other image cannot be asked: so many 64ths of its evidence are kept.
 #define EGOSGM_EVIDENCE_MOST 160
 #define EGOSGM_EVIDENCE_KEPT 45
 #define EGOSGM_EVIDENCE_KEPT_UNSEEN 58
@@ -71,7 +72,7 @@
 #define EGOSGM_SUPPORTERS_COUNT 12
 #define EGOSGM_LONE_PX 2.0f
 #define EGOSGM_SAME_SURFACE_PX 4.0f
-// The coarse match confirms a disparity that differs by no more than one of its pixels.
+// The coarse match confirms a disparity that differs by no more than one of its pixels, and contradicts others.
 #define EGOSGM_EVIDENCE_COARSE_PX 4.0f
 
 // OutputVariance: the filter's and the measurement's variance, each cut, at every fourth pixel around; the sum of two

@@ -78,6 +78,14 @@ static inline int any_of(const Ints condition) {
 #endif
 }
 
+#if PIXELS > 1
+// The sums of lanes 0 to 3, 4 to 7, and so on.
+static inline int4 sums_of_fours(const Ints lanes) {
+  const int8 pairs = lanes.even + lanes.odd;
+  return pairs.even + pairs.odd;
+}
+#endif
+
 // A lane of a block that lies in memory.
 #define LANE(type, block, lane) (((const type*)&(block))[lane])
 

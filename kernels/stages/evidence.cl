@@ -118,9 +118,17 @@ static inline int of_coarse(const CodeRows* coarse, const CodeRows* alike, const
          62 / bits;
 }
 
-// Sums of blocks of EGOSGM_COARSE x EGOSGM_COARSE pixels: the evidence of those that are asked and whose match
-// lies in the other image, and how many these are. `coarse_codes` and `alike` are those of the image at a quarter of
-// the resolution. A work-item a block, or a row of them.
+// The sum of a block: the evidence of `asked` pixels of its row, and how many these are; `absent` ones have none.
+// `coarse`: what a quarter of the resolution says of them.
+static inline EvidenceSum sum_of_block(const int beyond, const int coarse, const int asked, const int absent) {
+  const EvidenceSum sum = {EGOSGM_EVIDENCE_WEIGHT * (EGOSGM_EVIDENCE_UNITS / 4 * beyond + coarse),
+                           EGOSGM_EVIDENCE_WEIGHT * asked + absent};
+  return sum;
+}
+
+// Sums of blocks of EGOSGM_COARSE x EGOSGM_COARSE pixels, by the row in their middle: the evidence of those that are
+// asked and whose match lies in the other image. `coarse_codes` and `alike` are those of the image at a quarter of the
+// resolution. A work-item a block, or a row of them.
 COMPILED_ONCE void compare_row(const WorkItem at, const ImageSize size, const float gate, const int padding,
                                global const uint* codes, const int has_coarse, const int coarse_padding,
                                global const uint* coarse_codes, global const uint* alike, global const float* predicted,
@@ -128,50 +136,42 @@ COMPILED_ONCE void compare_row(const WorkItem at, const ImageSize size, const fl
   const ImageSize blocks = {(size.width + EGOSGM_COARSE - 1) / EGOSGM_COARSE,
                             (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE};
   const int view = at.view, width = size.width;
-  const int y = at.y * EGOSGM_COARSE, end = min(y + EGOSGM_COARSE, size.height);
-  const size_t first = (size_t)view * size.height;
+  const int top = at.y * EGOSGM_COARSE, middle = top + EGOSGM_COARSE / 2;
+  const int y = middle < size.height ? middle : top;
+  const CodeRows rows = code_rows(codes, size, padding, view, y);
   const CodeRows coarse = code_rows(coarse_codes, blocks, coarse_padding, view, at.y);
   const CodeRows alike_row = code_rows(alike, blocks, coarse_padding, view, at.y);
-  const int middle = y + EGOSGM_COARSE / 2 < size.height ? y + EGOSGM_COARSE / 2 : y;
+  const size_t pixels = ((size_t)view * size.height + y) * width;
   global EvidenceSum* row = sums + ((size_t)view * blocks.height + at.y) * blocks.width;
 #if PIXELS == 1
   if (at.x >= blocks.width) return;
   const int start = at.x * EGOSGM_COARSE, stop = min(start + EGOSGM_COARSE, width);
-  EvidenceSum sum = {0, 0};
+  int beyond = 0, asked_count = 0, absent = 0;
   float of_middle = EGOSGM_INVALID_DISPARITY;
-  for (int v = y; v < end; v += EGOSGM_EVIDENCE_ROW_STEP) {
-    const CodeRows rows = code_rows(codes, size, padding, view, v);
-    for (int x = start; x < stop; ++x) {
-      const size_t i = (first + v) * width + x;
-      const float asked = asked_of(predicted[i], measured[i], gate);
-      int counts;
-      sum.sum += EGOSGM_EVIDENCE_UNITS / 4 * compared(&rows, x, asked, &counts);
-      sum.count += counts;
-      if (v == middle && x == min(start + EGOSGM_COARSE / 2, width - 1)) of_middle = asked;
-    }
+  for (int x = start; x < stop; ++x) {
+    const float asked = asked_of(predicted[pixels + x], measured[pixels + x], gate);
+    int counts;
+    beyond += compared(&rows, x, asked, &counts);
+    asked_count += counts;
+    if (!(asked > EGOSGM_INVALID_DISPARITY)) ++absent;
+    if (x == min(start + EGOSGM_COARSE / 2, width - 1)) of_middle = asked;
   }
-  if (has_coarse) sum.sum += of_coarse(&coarse, &alike_row, at.x, of_middle, sum.count);
-  row[at.x] = sum;
+  const int of_quarter = has_coarse ? of_coarse(&coarse, &alike_row, at.x, of_middle, asked_count) : 0;
+  row[at.x] = sum_of_block(beyond, of_quarter, asked_count, absent);
 #else
   FOR_PIXELS(x, width) {
-    Ints evidence = 0, counted = 0;
-    Floats of_middle = INVALID;
-    for (int v = y; v < end; v += EGOSGM_EVIDENCE_ROW_STEP) {
-      const CodeRows rows = code_rows(codes, size, padding, view, v);
-      const size_t i = (first + v) * width;
-      const Floats asked = asked_of(load_pixels(predicted + i, x, width), load_pixels(measured + i, x, width), gate);
-      Ints counts;
-      evidence += compared(&rows, x, asked, &counts);
-      counted += counts;
-      if (v == middle) of_middle = asked;
-    }
-    const int8 evidence8 = evidence.even + evidence.odd, counted8 = counted.even + counted.odd;
-    const int4 evidence4 = evidence8.even + evidence8.odd, counted4 = counted8.even + counted8.odd;
+    const Floats of_prediction = load_pixels(predicted + pixels, x, width);
+    const Floats asked = asked_of(of_prediction, load_pixels(measured + pixels, x, width), gate);
+    Ints counts;
+    const Ints beyond = compared(&rows, x, asked, &counts);
+    const Ints absent = !(asked > INVALID) & (x + LANE_INDICES < (Ints)(width)) & (Ints)(1);
+    const int4 beyond4 = sums_of_fours(beyond), asked4 = sums_of_fours(counts), absent4 = sums_of_fours(absent);
     for (int i = 0; i < PIXELS / EGOSGM_COARSE && x / EGOSGM_COARSE + i < blocks.width; ++i) {
       const int block = x / EGOSGM_COARSE + i, lane = min(EGOSGM_COARSE * i + EGOSGM_COARSE / 2, width - 1 - x);
-      EvidenceSum sum = {EGOSGM_EVIDENCE_UNITS / 4 * LANE(int, evidence4, i), LANE(int, counted4, i)};
-      if (has_coarse) sum.sum += of_coarse(&coarse, &alike_row, block, LANE(float, of_middle, lane), sum.count);
-      row[block] = sum;
+      const int asked_count = LANE(int, asked4, i);
+      const int of_quarter =
+          has_coarse ? of_coarse(&coarse, &alike_row, block, LANE(float, asked, lane), asked_count) : 0;
+      row[block] = sum_of_block(LANE(int, beyond4, i), of_quarter, asked_count, LANE(int, absent4, i));
     }
   }
 #endif

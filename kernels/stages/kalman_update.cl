@@ -58,9 +58,8 @@ COMPILED_ONCE void sum_innovations_of_row(const WorkItem at, const ImageSize siz
     sums[block] = sum;
     counts[block] = count;
 #else
-    const int8 sum8 = sum.even + sum.odd, count8 = count.even + count.odd;
-    vstore4(sum8.even + sum8.odd, 0, sums + block);
-    vstore4(count8.even + count8.odd, 0, counts + block);
+    vstore4(sums_of_fours(sum), 0, sums + block);
+    vstore4(sums_of_fours(count), 0, counts + block);
 #endif
   }
 }
@@ -138,12 +137,14 @@ static inline Verdict judged(const KalmanParameters* q, const Ints before, const
   const Ints has_measurement = is_valid(z);
   const Ints stays = has_prediction & !(has_measurement & (fabs(z - d) > gate));
   const Ints is_found = is_valid(found) & (fabs(found - z) <= EGOSGM_EVIDENCE_COARSE_PX);
+  const Ints is_contradicted = stays & is_valid(found) & (fabs(found - d) > EGOSGM_EVIDENCE_COARSE_PX);
   const Floats away = nearest(d);
   const Floats match = FLOATS_OF_INTS(x + LANE_INDICES) + (view == EGOSGM_LEFT ? -away : away);
   const Ints is_unseen = stays & ((match < (Floats)(0.0f)) | (match >= (Floats)(q->width)));
   const Ints kept = before * EGOSGM_EVIDENCE_KEPT >> 6;
   const Ints chosen = (Ints)(EGOSGM_EVIDENCE_OF_CHOICE);
-  Ints sums = (stays ? kept : is_found ? (Ints)(0) : -chosen) + now - EGOSGM_EVIDENCE_OF_NOISE;
+  const Ints of_noise = (is_contradicted ? (Ints)(2) : (Ints)(1)) * EGOSGM_EVIDENCE_OF_NOISE;
+  Ints sums = (stays ? kept : is_found ? (Ints)(0) : -chosen) + now - of_noise;
   sums = sums < EGOSGM_EVIDENCE_MOST ? sums : (Ints)(EGOSGM_EVIDENCE_MOST);
   sums = is_unseen ? before * EGOSGM_EVIDENCE_KEPT_UNSEEN >> 6 : sums;
   // A measurement without evidence contradicts nothing: the prediction stays, and was not asked.

@@ -46,7 +46,10 @@ std::optional<int> beyond(const ViewCodes& codes, const int (&controls)[N], int 
 }
 
 struct Sum {
-  int evidence = 0, count = 0;
+  int evidence = 0, asked = 0, absent = 0;
+
+  int count() const { return kEvidenceWeight * asked + absent; }
+  int mean() const { return count() > 0 ? kEvidenceWeight * evidence / count() : 0; }
 };
 
 /// By a block's code of what is alike: 9x7 bits without the one in the middle, the first one the highest.
@@ -69,26 +72,24 @@ BlockEvidence block_evidence(float gate_px, const ViewCodes& codes, const std::o
       return asked(gate_px, predicted.disparity[i], measured.disparity[i]);
     };
     std::vector<Sum> sums(static_cast<std::size_t>(rows) * columns);
-    for (int y = 0; y < height; y += 2) {  // codes of neighbouring rows are alike
+    const auto row_of = [&](int top) { return top + kSide / 2 < height ? top + kSide / 2 : top; };
+    for (int top = 0; top < height; top += kSide) {  // codes of neighbouring rows are alike
       for (int x = 0; x < width; ++x) {
-        const float d = asked_at(x, y);
-        if (!is_valid(d)) continue;
-        const std::optional<int> four = beyond(codes, kControls, view, x, y, d);
-        if (!four) continue;
-        Sum& sum = sums[static_cast<std::size_t>(y / kSide) * columns + x / kSide];
-        sum.evidence += 16 * *four / 4;
-        ++sum.count;
+        const float d = asked_at(x, row_of(top));
+        Sum& sum = sums[static_cast<std::size_t>(top / kSide) * columns + x / kSide];
+        if (!is_valid(d)) ++sum.absent;
+        const std::optional<int> four = is_valid(d) ? beyond(codes, kControls, view, x, row_of(top), d) : std::nullopt;
+        if (four) sum.evidence += 16 * *four / 4, ++sum.asked;
       }
     }
     for (int i = 0; coarse && i < rows * columns; ++i) {
       const int x = i % columns, y = i / columns;
-      const int middle = kSide * y + kSide / 2 < height ? kSide * y + kSide / 2 : kSide * y;
-      const float d = asked_at(std::min(kSide * x + kSide / 2, width - 1), middle);
+      const float d = asked_at(std::min(kSide * x + kSide / 2, width - 1), row_of(kSide * y));
       if (!is_valid(d)) continue;
       const std::optional<int> eight =
           beyond(coarse->codes, kCoarseControls, view, x, y, d / kSide, coarse->alike.of_view[view][i]);
       const int bits = std::popcount(coarse->alike.of_view[view][i]);
-      if (eight && bits >= 12) sums[i].evidence += sums[i].count * *eight * 62 / bits;  // 16 / 8, halved
+      if (eight && bits >= 12) sums[i].evidence += sums[i].asked * *eight * 62 / bits;  // 16 / 8, halved
     }
     for (int i = 0; i < rows * columns; ++i) {
       const int x = i % columns, y = i / columns;
@@ -97,15 +98,15 @@ BlockEvidence block_evidence(float gate_px, const ViewCodes& codes, const std::o
         for (int v = std::max(0, y - up); v <= std::min(rows - 1, y + down); ++v) {
           for (int u = std::max(0, x - left); u <= std::min(columns - 1, x + right); ++u) {
             if (coarse && !is_alike(coarse->alike.of_view[view][i], u - x, v - y)) continue;
-            sum.evidence += sums[v * columns + u].evidence, sum.count += sums[v * columns + u].count;
+            const Sum& block = sums[v * columns + u];
+            sum.evidence += block.evidence, sum.asked += block.asked, sum.absent += block.absent;
           }
         }
         return sum;
       };
-      const Sum whole = over(2, 2, 2, 2);
-      int least = whole.count > 0 ? whole.evidence / whole.count : 0;
+      int least = over(2, 2, 2, 2).mean();
       for (const Sum& half : {over(2, 0, 2, 2), over(0, 2, 2, 2), over(2, 2, 2, 0), over(2, 2, 0, 2)}) {
-        if (4 * half.count > 5 * 3 * kSide * kSide / 2) least = std::min(least, half.evidence / half.count);
+        if (2 * half.count() > 5 * 3 * kSide * kEvidenceWeight) least = std::min(least, half.mean());
       }
       result.evidence.push_back(least);
       const float d =
@@ -140,7 +141,9 @@ Verdict judge(shared::ImageSize size, float gate_px, const FrameEvidence& frame,
   const bool is_found = is_valid(found) && std::abs(found - measured) <= kSide;
   if (frame.sees_again && !is_valid(predicted) && !is_found) return {0, false, true};
   const int start = stays ? before * 45 / 64 : is_found ? 0 : -kEvidenceOfChoice;
-  const int evidence = std::min(start + now - kEvidenceOfNoise, kMostEvidence);
+  const bool is_contradicted = stays && is_valid(found) && std::abs(found - predicted) > kSide;
+  const int of_noise = is_contradicted ? 2 * kEvidenceOfNoise : kEvidenceOfNoise;
+  const int evidence = std::min(start + now - of_noise, kMostEvidence);
   if (evidence < 0 && !stays && is_valid(predicted)) {  // what has no evidence contradicts nothing
     const int left = before * 45 / 64 - kEvidenceOfNoise;
     return {left, left >= 0, false};

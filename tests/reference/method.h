@@ -16,6 +16,7 @@ inline constexpr int kCoarseControls[8] = {-19, -14, -10, -7, 7, 10, 14, 19};
 inline constexpr int kConfirmedEvidence = 64;
 inline constexpr int kEvidenceOfChoice = 48;
 inline constexpr int kEvidenceOfNoise = 24;
+inline constexpr int kEvidenceWeight = 4;
 inline constexpr int kMostEvidence = 160;
 inline constexpr int kTrustedEvidence = 96;
 inline constexpr int kDynamicAgrees = 24;

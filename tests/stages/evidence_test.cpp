@@ -158,7 +158,18 @@ TEST(Evidence, IsNothingInNoise) {
   // The least of five means lies a little below the mean, by how much noise scatters.
   EXPECT_LT(mean(blocks.evidence), 0);
   EXPECT_GT(mean(blocks.evidence), 16 * -3);
-  EXPECT_LT(*std::max_element(blocks.evidence.begin(), blocks.evidence.end()), 16 * 8) << "8 bits";
+  // A window asks one row of four, 100 pixels, whose means scatter by so much.
+  EXPECT_LT(*std::max_element(blocks.evidence.begin(), blocks.evidence.end()), 16 * 9) << "9 bits";
+}
+
+TEST(Evidence, CountsFourPixelsWithoutADisparityAsOneWithNone) {
+  const Images images = shifted(noise(kSize, 1), 8);
+  const testing::HostMaps everything = everywhere(kSize, 8);
+  testing::HostMaps half = everything;
+  for (std::size_t i = 0; i < half.disparity.size(); i += 2) half.disparity[i] = kNone;
+  const auto all = evidence_of(images, false, nothing_found(images), everything, everything, 0);
+  const auto sparse = evidence_of(images, false, nothing_found(images), half, half, 0);
+  EXPECT_NEAR(mean(sparse.evidence) / mean(all.evidence), 4.0 / (4 + 1), 0.02);
 }
 
 TEST(Evidence, IsAThirdOfTheBitsOfAMatchWithoutNoise) {

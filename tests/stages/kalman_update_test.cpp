@@ -261,6 +261,9 @@ TEST(KalmanUpdate, EvidenceAddsUpAndDecays) {
   EXPECT_EQ(judged({.measured = 5, .now = 71}), (Judged{kNothing, 0}));
   EXPECT_EQ(judged({.measured = 5, .now = 24, .found = 9}), (Judged{{5, 1}, 0})) << "the coarse match found it, too";
   EXPECT_EQ(judged({.measured = 5, .now = 24, .found = 9.5f}), (Judged{kNothing, 0})) << "but not that";
+  EXPECT_EQ(judged({.predicted = 5, .measured = 6, .before = 64, .now = 40, .found = 9.5f}).evidence, 45 + 40 - 48)
+      << "the coarse match contradicts it";
+  EXPECT_EQ(judged({.predicted = 5, .measured = 6, .before = 64, .now = 40, .found = 9}).evidence, 45 + 40 - 24);
   EXPECT_EQ(judged({.predicted = 5, .measured = 9, .before = 128, .now = 90}).evidence, 90 - 72)
       << "contradicted: what was believed does not count";
   EXPECT_EQ(judged({.predicted = 5, .measured = 9, .before = 128, .now = 71}), (Judged{{5, 1}, 90 - 24}))
