@@ -53,7 +53,7 @@ def costs_of(row, costs):
     formulas = costs["kernels"].get(kernel, {})
     names = {"pixels": row["width"] * row["height"], "rows": row["height"], "cells": row["cells"]}
     if f"{stage}.{kernel}" in costs["small"]:  # images of a quarter the width and height, in their whole range
-        frame, names = "small", {"pixels": names["pixels"] / 16, "rows": names["rows"] / 4, "cells": 2 * names["pixels"] / 16 * max(8, row["disparities"] / 4)}
+        frame, names = "small", {"pixels": names["pixels"] / 16, "rows": names["rows"] / 4, "cells": names["pixels"] / 16 * max(8, row["disparities"] / 4)}
     times = 1 if kernel in costs["of_frame"] else row["launches"]
     return {name: times * float(eval(formula, {"__builtins__": {}}, names)) for name, formula in {**formulas, **formulas.get(frame, {})}.items()
             if isinstance(formula, str)}

@@ -33,7 +33,7 @@ struct ConsistencyCheckOptions {
 };
 struct CoarseMatchOptions {
   bool enabled = true;  // match at a quarter of the resolution too, so that what moves by itself is searched for
-  int p1 = 6, p2 = 60, p2_at_edges = 40;  // as in BandedSgmOptions, for a census of 5x5 coarse pixels
+  int p1 = 8, p2 = 60, p2_at_edges = 40;  // as in BandedSgmOptions, for a census of 5x5 coarse pixels
   float max_difference_px = 1.5f;         // of the left-right check, in coarse pixels
 };
 struct SearchBandOptions {

@@ -72,8 +72,9 @@
 #define EGOSGM_SUPPORTERS_COUNT 12
 #define EGOSGM_LONE_PX 2.0f
 #define EGOSGM_SAME_SURFACE_PX 4.0f
-// The coarse match confirms a disparity that differs by no more than one of its pixels, and contradicts others.
-#define EGOSGM_EVIDENCE_COARSE_PX 4.0f
+// The coarse match confirms a disparity that differs by no more than one and a half of its pixels, and contradicts
+// others: its right view has whole ones.
+#define EGOSGM_EVIDENCE_COARSE_PX 6.0f
 
 // OutputVariance: the filter's and the measurement's variance, each cut, at every fourth pixel around; the sum of two
 // second differences of disparities, each cut, at every pixel nearer by; and how far the disparities this far off to

@@ -137,7 +137,7 @@ void expect_report(const FrameReport& report, const reference::Frame& expected, 
       if (row % height % expected.row_step == 0) searched += pass.band.bands[i].chunks * EGOSGM_LANES;
     }
     const int coarse_chunks = SearchBand::max_chunks(CoarseMatch::coarse_range(range_of(setting.options)));
-    searched += static_cast<double>(pass.coarse.size()) * coarse_chunks * EGOSGM_LANES;  // of both views
+    searched += static_cast<double>(pass.coarse.size() / 2) * coarse_chunks * EGOSGM_LANES;  // of the left view
   }
   const double cells = 1.0 * views * setting.size.width * setting.size.height * setting.options.disparities;
   EXPECT_EQ(to_string(report.unpredicted), expected.unpredicted);

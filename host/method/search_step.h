@@ -23,7 +23,7 @@ class SearchStep {
   /// REQUIRES: the last frame had a coarse match.
   const ocl::Buffer<cl_uchar>& coarse_images() const { return coarse_match_->images(); }
 
-  /// Cells that a coarse match matches, of both views.
+  /// Cells that a coarse match matches.
   std::uint64_t coarse_cells() const { return coarse_match_ ? coarse_match_->matched_cells() : 0; }
 
  private:

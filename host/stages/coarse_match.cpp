@@ -60,18 +60,19 @@ CoarseMatch::CoarseMatch(ocl::Context& context, shared::ImageSize size, const Me
       images_{ocl::Buffer<cl_uchar>(context, 2 * 2 * pixel_count(coarse_)), PixelType::kU16},
       matched_(context, coarse_) {
   matcher_.prepare(PixelType::kU16);
+  matcher_.prepare_reading_off();
 }
 
 void CoarseMatch::match(const FrameImages& images, Map& found) {
   const ocl::Context::Within within(context_, "CoarseMatch");
   shrink_[images.type].shrink(images, images_);
-  matcher_.match(images_, everything_, matched_, Views::kBoth);
+  matcher_.reading_off(images_, everything_, matched_, Views::kLeft, /*coded=*/1);
   consistency_.check(matched_.disparity, max_difference_px_, OutsideView::kDrop, found, Views::kBoth);
 }
 
 std::uint64_t CoarseMatch::matched_cells() const {
   const std::uint64_t lanes = static_cast<std::uint64_t>(SearchBand::max_chunks(range_)) * EGOSGM_LANES;
-  return 2 * lanes * coarse_.width * matcher_.banded_sgm().matched_rows();
+  return lanes * coarse_.width * matcher_.banded_sgm().matched_rows();
 }
 
 }  // namespace egosgm

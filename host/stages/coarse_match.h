@@ -21,9 +21,9 @@ class Shrink {
   ocl::Kernel<const shared::ImageSize, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>> shrink_;
 };
 
-/// Matches both views over the full range at a quarter of the resolution, without a prediction: what is far from what
-/// the prediction says shows here first. A pixel of the result stands for EGOSGM_COARSE x EGOSGM_COARSE pixels, and its
-/// disparity for EGOSGM_COARSE times as many.
+/// Matches the left view over the full range at a quarter of the resolution, without a prediction, and reads the right
+/// view off its path sums: what is far from what the prediction says shows here first. A pixel of the result stands for
+/// EGOSGM_COARSE x EGOSGM_COARSE pixels, and its disparity for EGOSGM_COARSE times as many.
 class CoarseMatch {
  public:
   /// `tile`: of the match at full resolution, whose program this one takes where it can.
@@ -36,7 +36,7 @@ class CoarseMatch {
   /// images' type was prepared.
   void match(const FrameImages& images, Map& found);
 
-  /// Cells that a call matches, of both views.
+  /// Cells that a call matches.
   std::uint64_t matched_cells() const;
 
   /// Both views at a quarter of the resolution, 16 bits: of the last call.

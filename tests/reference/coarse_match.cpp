@@ -51,7 +51,8 @@ std::vector<float> coarse_match(shared::ImageSize size, const MethodOptions& opt
   std::vector<std::uint16_t> grey = shrunken;
   for (std::uint16_t& value : grey) value /= 256;
   const shared::DisparityRange range{first, last - first + 1};
-  const testing::HostMaps matched = banded_sgm(coarse, range, sgm, both, grey, full_range(coarse, range).bands);
+  const testing::HostMaps matched =
+      banded_sgm(coarse, range, sgm, both, grey, full_range(coarse, range).bands, /*reads_off=*/true);
   return consistency_check(coarse, options.coarse_match.max_difference_px, false, matched).disparity;
 }
 

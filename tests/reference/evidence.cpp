@@ -138,10 +138,10 @@ Verdict judge(shared::ImageSize size, float gate_px, const FrameEvidence& frame,
   const float found = frame.blocks.found[block];
   const int match = stays ? seen_by_other(view, x, predicted) : x;
   if (match < 0 || match >= size.width) return {before * 58 / 64, true, now >= kEvidenceOfNoise};
-  const bool is_found = is_valid(found) && std::abs(found - measured) <= kSide;
+  const bool is_found = is_valid(found) && std::abs(found - measured) <= kCoarseConfirmsPx;
   if (frame.sees_again && !is_valid(predicted) && !is_found) return {0, false, true};
   const int start = stays ? before * 45 / 64 : is_found ? 0 : -kEvidenceOfChoice;
-  const bool is_contradicted = stays && is_valid(found) && std::abs(found - predicted) > kSide;
+  const bool is_contradicted = stays && is_valid(found) && std::abs(found - predicted) > kCoarseConfirmsPx;
   const int of_noise = is_contradicted ? 2 * kEvidenceOfNoise : kEvidenceOfNoise;
   const int evidence = std::min(start + now - of_noise, kMostEvidence);
   if (evidence < 0 && !stays && is_valid(predicted)) {  // what has no evidence contradicts nothing

@@ -7,6 +7,7 @@ namespace egosgm::reference {
 inline constexpr int kCoarseMinCount = 8;
 inline constexpr int kCoarseOutliers = 2;
 inline constexpr float kCoarseFartherPx = 3.0f;
+inline constexpr float kCoarseConfirmsPx = 6.0f;
 inline constexpr float kThinJumpPx = 3.0f;
 inline constexpr int kThinBlocks = 2;
 inline constexpr int kThinReach = 8;
