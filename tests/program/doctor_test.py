@@ -108,6 +108,16 @@ class Doctor(InputTest):
                                            "--calib", self.street / "calib.txt")
         self.assertIn("swapped", finding["remedy"])
 
+    def test_shifted_views_are_not_said_to_be_swapped(self):
+        """By how much the right images are moved, the doffs_px that is given, and which checks find a problem."""
+        for shift, doffs, checks, words in ((10, 0, ["sides", "range"], "the principal points differ"), (30, -30, ["sides", "range"], "its sign may be wrong"),
+                                            (30, 30, ["range"], "give --min-disparity -3")):
+            street = self.changed_street(lambda image: numpy.roll(image, shift, 1), ["image_1"])
+            findings = self.examine(*self.patterns(street, self.calibrated(doffs_px=doffs)), code=2)
+            with self.subTest(shift=shift, doffs=doffs):
+                self.assertEqual([name for name, finding in findings.items() if finding["verdict"] == "problem"], checks, findings)
+                self.assertIn(words, findings[checks[0]]["remedy"])
+
     def test_a_camera_that_is_off_in_some_frames(self):
         street = self.broken_street()
         for i in (1, 2):

@@ -206,11 +206,8 @@ class Examination:
         if 0 < swapped < self._pairs:
             return [*found, Finding("problem", "sides", f"in {swapped} of {self._pairs} pairs that were looked at, most points lie behind the cameras", "left and right are swapped in these: "
                                     "exchange their images; a recorder that takes both cameras from one stream, and loses an image, swaps all that follow")]
-        behind = self._share_below(coarse, points, -self._doffs() - _BEHIND_PX)
-        found.append(self._sides(behind))
-        if behind <= 0.5:
-            found.append(self._range(coarse, points))
-        return found
+        is_swapped, sides = self._sides(coarse, points)
+        return [*found, sides] if is_swapped else [*found, sides, self._range(coarse, points)]
 
     def _change(self) -> str:
         """How the right images are changed, where only then a coarse match finds much in the last pair."""
@@ -309,21 +306,26 @@ class Examination:
     def _without_texture(self, points: Optional[NDArray[np.float32]]) -> List[Finding]:
         found = []
         if points is not None:
-            found.append(self._sides(float(np.mean(points < -self._doffs() - _BEHIND_PX))))
+            found.append(self._sides(points, points)[1])
         share = 100 * sum(map(len, self._coarse)) / max(1, self._coarse_pixels)
         return [*found, Finding("note", "texture", f"a coarse match is sure of {share:.1f} % of the image, too little to tell a range by",
                                 "much will stay empty: give images with more light, sharper, or of what has texture")]
 
-    @staticmethod
-    def _sides(behind: float) -> Finding:
+    def _sides(self, coarse: NDArray[np.float32], points: Optional[NDArray[np.float32]]) -> Tuple[bool, Finding]:
+        """Whether left and right are swapped, and what is said: then nearly all points lie behind the cameras; of views that are shifted, the far ones do."""
+        doffs = self._doffs()
+        behind = self._share_below(coarse, points, -doffs - _BEHIND_PX)
         text = f"{100 * behind:.1f} % of the points lie behind the cameras"
-        if behind > 0.5:
-            return Finding("problem", "sides", text, "left and right are swapped, or both images are mirrored or upside down: "
-                           "exchange the images (and their calibrations), or turn them")
         if behind <= _BEHIND_SHARE:
-            return Finding("ok", "sides", text)
-        return Finding("problem", "sides", text, "the principal points differ by more than doffs_px says, or the cameras converge: rectify again, or give "
-                       "--min-disparity and doffs_px")
+            return False, Finding("ok", "sides", text)
+        if doffs < 0 and self._share_below(coarse, points, doffs - _BEHIND_PX) <= _BEHIND_SHARE:
+            return False, Finding("problem", "sides", f"{text} with doffs_px {doffs:g}, and none with {-doffs:g}", "give doffs_px as the right image's cx less the left one's: its sign "
+                                  "may be wrong")
+        if behind > 0.5 and self._share_below(-coarse, None if points is None else -points, min(0.0, doffs) - _BEHIND_PX) <= _BEHIND_SHARE:
+            return True, Finding("problem", "sides", text, "left and right are swapped, or both images are mirrored or upside down: "
+                                 "exchange the images (and their calibrations), or turn them")
+        return False, Finding("problem", "sides", text, "the principal points differ by more than doffs_px says, or the cameras converge: rectify again, or give "
+                              "--min-disparity and doffs_px")
 
     def _range(self, coarse: NDArray[np.float32], points: Optional[NDArray[np.float32]]) -> Finding:
         low, high, farthest = (float(value) for value in np.quantile(coarse, (0.005, 0.995, 0.999)))
@@ -333,7 +335,7 @@ class Examination:
         if above > _CLIPPED_SHARE:
             return Finding("problem", "range", f"{text}: it clips {100 * above:.1f} % of them, the near ones",
                            f"give --disparities {_rounded_up(1.1 * high - least + 1)}")
-        if below > _CLIPPED_SHARE and high > 0:
+        if below > _CLIPPED_SHARE:
             return Finding("problem", "range", f"{text}: it clips {100 * below:.1f} % of them, the far ones", f"give --min-disparity {int(np.floor(low)) - 2}")
         if 2 * (farthest - least + 1) < end - least:
             return Finding("note", "range", f"{text}: half of it is never needed",
