@@ -85,6 +85,12 @@ class Doctor(InputTest):
             self.assertNotIn("doctor", self.said_by_run(street))
             self.assertEqual(self.examine(street, code=0)["images"]["verdict"], "ok")
 
+    def test_dark_images_and_another_exposure_or_gamma_of_one_side_are_matched(self):
+        for change, *how in ((lambda image: 0.2 * image, ["image_1"]), (lambda image: 255 * (image / 255.0) ** 3, ["image_1"]), (lambda image: 0.11 * image,)):
+            found = self.examine(self.changed_street(change, *how))
+            self.assertEqual((found["rows"]["verdict"], found["sides"]["verdict"], found["range"]["verdict"]), ("ok", "ok", "note"), found)
+            self.assertEqual("times as bright" in found["images"]["text"], bool(how))
+
     def shifted(self, shift_px):
         y, x = numpy.mgrid[0:HEIGHT, 0:WIDTH]
         return self.changed_street(lambda image: sampled(image, x, y - shift_px), ["image_1"])

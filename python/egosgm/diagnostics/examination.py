@@ -22,7 +22,7 @@ _FEWEST_AGREEING = 0.4  # of the matches; below, they are mistaken for each othe
 _CLIPPED_SHARE = 0.01  # of the points
 _BEHIND_SHARE, _BEHIND_PX = 0.02, 1.0  # points whose disparity none before the cameras has
 _MOST_BRIGHTNESS = 1.25  # of one image by the other's
-_LEAST_CONTRAST = 16  # grey levels of 256 between which nearly all pixels lie
+_LEAST_CONTRAST, _USUAL_CONTRAST = 16, 64  # grey levels of 256 between which nearly all pixels lie
 _MOST_SATURATED = 0.25  # of the pixels
 _LEAST_COMB = 1.5  # how much more neighbouring rows differ than those two apart
 _FEWEST_COARSE = 0.03  # of the pixels of the coarse map; below, it says nothing
@@ -44,6 +44,20 @@ class Finding(NamedTuple):
     remedy: str = ""
 
 
+def _comparable(left: NDArray[Any], right: NDArray[Any]) -> Tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """The pair as bytes, over all grey levels, whose steps tell what is a point: where both are dark, by one factor; of another exposure or gamma, each by itself."""
+    import cv2
+    greys = _egosgm._grey_bytes(left, right)
+    low, high = np.quantile(greys, (0.001, 0.999))
+    contrasts, means = [float(np.ptp(np.quantile(image, (0.01, 0.99)))) for image in greys], [float(image.mean()) for image in greys]
+    if min(contrasts) > 0 and any(max(values) > _MOST_BRIGHTNESS * min(values) for values in (contrasts, means)):
+        return cv2.equalizeHist(greys[0]), cv2.equalizeHist(greys[1])
+    if not 0 < high - low < _USUAL_CONTRAST:
+        return greys
+    dark, dark_right = (np.clip((image - low) * (255 / (high - low)), 0, 255).astype(np.uint8) for image in greys)
+    return dark, dark_right
+
+
 def match_pair(left: NDArray[Any], right: NDArray[Any]) -> NDArray[np.float32]:
     """Points found in both images, wherever they lie: (N, 4) of x_left, y_left, x_right, y_right [px]. Rectified images have them in equal rows;
     nothing is assumed of rows, sides or range here. Matched by ORB, outliers dropped by a fundamental matrix, refined to a part of a pixel."""
@@ -51,7 +65,7 @@ def match_pair(left: NDArray[Any], right: NDArray[Any]) -> NDArray[np.float32]:
     left, right = np.asarray(left), np.asarray(right)
     if left.ndim != 2 or left.shape != right.shape or left.dtype != right.dtype or left.dtype not in (np.uint8, np.uint16):
         raise _egosgm.InvalidArgument("the pair: give grey images of 8 or 16 bits, both of one size and depth")
-    left, right = _egosgm._grey_bytes(left, right)
+    left, right = _comparable(left, right)
     none = np.empty((0, 4), np.float32)
     detector = cv2.ORB_create(_FEATURES, 1.2, 4, _MARGIN_PX, 0, 2, cv2.ORB_HARRIS_SCORE, 31, _FAST_THRESHOLD)
     (left_points, left_words), (right_points, right_words) = (detector.detectAndCompute(image, None) for image in (left, right))
@@ -168,8 +182,8 @@ class Examination:
             self._interlaced += int(max(map(_comb, (left, right))) > _LEAST_COMB)
         self._matches.append(matches)
         row_offset = float(np.median(matches[:, 3] - matches[:, 1])) if len(matches) else 0.0
-        coarse = _egosgm._coarse_map(left, right, row_offset, self._least, self._end)
-        self._last = left, right
+        self._last = _comparable(left, right)
+        coarse = _egosgm._coarse_map(*self._last, row_offset, self._least, self._end)
         self._coarse_pixels += coarse.size
         self._coarse.append(coarse[np.isfinite(coarse)])
 
