@@ -239,6 +239,18 @@ class Doctor(InputTest):
                 write_grey(street / "image_1" / file.name, numpy.roll(read_grey(file), -shift, 1))
             self.assertIn(f"the left ones, moved by {shift} px", self.assert_only_problem("matches", street)["text"])
 
+    def test_copies_that_differ(self):
+        """By noise, or by a part of a pixel that one is moved by."""
+        random = numpy.random.default_rng(1)
+        y, x = numpy.mgrid[0:HEIGHT, 0:WIDTH]
+        for shift, noise, verdict in ((0, 3, "problem"), (0.3, 0, "problem"), (3.5, 2, "note")):
+            street = self.broken_street()
+            for file in (street / "image_0").iterdir():
+                write_grey(street / "image_1" / file.name, numpy.clip(sampled(read_grey(file), x + shift, y) + random.normal(0, noise, (HEIGHT, WIDTH)), 0, 255))
+            found = self.examine(street, code=2 if verdict == "problem" else 0)
+            self.assertEqual((found["depths"]["verdict"], found["rows"]["verdict"]), (verdict, "ok"))
+            self.assertIn(f"one disparity, {shift:.1f}", found["depths"]["text"])
+
     def test_rows_of_two_moments(self):
         street = self.broken_street()
         for side in (0, 1):

@@ -17,6 +17,7 @@ _EPIPOLAR_PX, _RETURN_PX = 1.5, 0.3
 FEWEST_MATCHES, _FEWEST_SURE = 30, 8  # the latter beside a coarse map that is sure of much
 _MOST_OFFSET_PX = 0.6  # KITTI's own pairs reach that
 _MOST_SPREAD_PX = 1.0  # of the rest, 90 % of the matches that agree
+_MOST_OF_COPY_PX = 0.5  # between disparities; scenes have more
 _AGREEMENT_PX = 1.0  # of a match with what most of them say
 _FEWEST_AGREEING = 0.4  # of the matches; below, they are mistaken for each other
 _CLIPPED_SHARE = 0.01  # of the points
@@ -212,7 +213,7 @@ class Examination:
                                     "the images are turned by 90 degrees: turn them back; or one camera stands above the other: turn the images of both, and calibrate them so")]
         agreeing = matches[_agreeing(matches, self._width, self._height)] if len(matches) >= FEWEST_MATCHES else matches[:0]
         is_agreed = len(agreeing) >= max(FEWEST_MATCHES, _FEWEST_AGREEING * len(matches))
-        found.append(self._rows(len(matches), agreeing))
+        found += [self._rows(len(matches), agreeing), *self._depths(matches)]
         points = agreeing[:, 0] - agreeing[:, 2] if is_agreed else None
         if not is_sure:
             return [*found, *self._without_texture(points)]
@@ -316,6 +317,16 @@ class Examination:
         remedy = "rectify again (egosgm rectify, from the raw images and a new calibration)" if self._calibration else \
             "these images are not rectified: `egosgm calibrate` finds the cameras, and `egosgm rectify` makes images of equal rows"
         return Finding("problem", "rows", text, f"{max(abs(offset), spread):.1f} px: {remedy}")
+
+    def _depths(self, matches: NDArray[np.float32]) -> List[Finding]:
+        """Copies of one image, with noise, or moved by a part of a pixel, have one disparity."""
+        disparities = matches[:, 0] - matches[:, 2]
+        if len(matches) < FEWEST_MATCHES or spread(disparities) > _MOST_OF_COPY_PX:
+            return []
+        middle = float(np.median(disparities))
+        is_far = abs(middle + self._doffs()) <= _MOST_OF_COPY_PX
+        return [Finding("problem" if is_far else "note", "depths", f"the points have one disparity, {middle + 0.0:.2f} px, 90 % within {spread(disparities):.2f} px of it",
+                        "both images come from one camera, or show nothing but " + ("what is too far for these cameras" if is_far else "a wall") + ": give the images of both cameras")]
 
     def _without_texture(self, points: Optional[NDArray[np.float32]]) -> List[Finding]:
         found = []
