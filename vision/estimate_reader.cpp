@@ -49,11 +49,12 @@ Image EstimateReader::read(const std::filesystem::path& file, double scale) {
   Image map = read_scaled(file, scale);
   const bool png = is_png(file);
   std::optional<float> marker;
-  bool is_marker = true;
+  bool is_marker = true, zero_is_marker = true;
   std::int64_t values = 0, impossible = 0, markers = 0;
   for (int y = 0; y < map.rows; ++y) {
     for (int x = 0; x < map.cols; ++x) {
       const float d = map.at<float>(y, x);
+      if (!is_valid_disparity(d) && !png) zero_is_marker = false;  // infinity is
       if (!is_valid_disparity(d) || d >= 0) continue;
       is_marker = is_marker && d == marker.value_or(d);
       marker = d;
@@ -67,7 +68,7 @@ Image EstimateReader::read(const std::filesystem::path& file, double scale) {
       const bool beyond = d >= static_cast<float>(map.cols) || (png && d * scale >= kLeastSigned);
       impossible += beyond;
       markers += d < 0 && is_marker;
-      if (beyond || d == 0 || (d < 0 && is_marker)) d = kInvalidDisparity;
+      if (beyond || (d == 0 && zero_is_marker) || (d < 0 && is_marker)) d = kInvalidDisparity;
     }
   }
   const std::scoped_lock lock(mutex_);

@@ -288,6 +288,16 @@ class Maps(Brought):
             assert_holes(self.png16, "map.png", nothing, sixteenths, numpy.int64, "--scale", 16, is_told=nothing < 0)
             assert_holes(self.npy, "map.npy", nothing, sixteenths, numpy.int16, "--scale", 16)
 
+    def test_zero_is_a_disparity_where_infinity_marks_what_has_none(self):
+        """Runs write such PFM, of a sky for instance, and PNG with the least value there."""
+        self.npy(self.maps / "truth.npy", numpy.where(self.truth < 8, numpy.float32(1 / 256), self.truth))
+        values = numpy.where(self.missing, numpy.inf, numpy.where(self.truth < 8, 0, self.truth))
+        self.pfm(self.maps / "map.pfm", values)
+        self.png16(self.maps / "map.png", numpy.where(self.missing, 0, numpy.maximum(1, 256 * numpy.where(self.missing, 0, values))))
+        of_pfm, of_png = (self.json_of("eval", self.maps / name, self.maps / "truth.npy")["pooled"] for name in ("map.pfm", "map.png"))
+        for name in ("filled", "density", "bad_or_missing"):
+            self.assertEqual(of_pfm[name], of_png[name], name)
+
     def test_negative_disparities_that_differ_are_values(self):
         self.npy(self.maps / "truth.npy", numpy.abs(self.truth))
         self.pfm(self.maps / "signed.pfm", numpy.where(self.missing, -self.truth, self.truth))
