@@ -329,6 +329,9 @@ class Rectify(RectifyTest):
         others = ("a.pfm", b"Pf\n8 8\n-1\n" + bytes(256), "a map of floats"), ("a.dng", b"II*\0" + bytes(99), "developed to PNG"), ("a.pnm", b"P5\n2 2\n255\nabcd", "name it .pgm")
         for name, content, _ in others:  # which OpenCV would take for videos
             (folder / name).write_bytes(content)
+        page = numpy.zeros((8, 8), numpy.uint8)
+        for name, pages in (("pages.tif", [page] * 3), ("float.tif", [page / numpy.float32(2)]), ("small.tif", [page, page[:4, :4]])):
+            cv2.imwritemulti(str(folder / name), pages)
         for bits in (8, 16):
             (folder / f"{bits}.png").write_bytes(png(8, 8, bits, [bytes(bits)] * 8))
         left, both = f"--left {raw}/cam0/*.png", f"--left {raw}/cam0/*.png --right {raw}/cam1/%d.png"
@@ -336,9 +339,11 @@ class Rectify(RectifyTest):
             (f"{left} --right {raw}/cam1/9.png", "both must hold"), (f"{left} --right {{street}}/image_1/*.png", "no right image has the name", "--pair-by order"),
             (f"--side-by-side {raw}/*.jpg", "no file matches"), (left, "half a pair"), (f"{both} --list {calib}", "more than one input"),
             ("--side-by-side {street}/calib.txt", "calib.txt"), (f"{both} --unit inch", "--unit inch"), (f"{both} --alpha 2", "--alpha 2"),
+            (f"--left {folder}/small.tif --right {folder}/16.png", "8x8 of 8 bits", "8x8 of 16 bits"),
             *((f"--side-by-side {folder}/{name}", name, "not a readable image") for name in ("cut.png", "cut.jpg")),  # one line, whole or not at all
             *((f"--side-by-side {folder}/{name}", name, "neither an image nor a video") for name in ("empty.mp4", "empty.avi")),
             *((f"--side-by-side {folder}/{name}", words) for name, _, words in others), (f"{folder}/8.png {folder}/16.png", "--left LEFT --right RIGHT"),
+            (f"--side-by-side {folder}/pages.tif", "pages.tif: holds 3 pictures"), (f"--side-by-side {folder}/float.tif", "float.tif", "its pixels are float32"),
             (f"--list {folder}/half.txt", "half.txt:1"), (f"--list {folder}/same.txt", "same.txt:1", "is the left and the right image"),
             (f"--left {folder}/8.png --right {folder}/16.png", "8x8 of 8 bits", "8x8 of 16 bits")), ["rectify"], ["--calib", calib, "--out", self.folder / "never"])
         self.assert_all_refused((

@@ -52,9 +52,13 @@ def _read_image(file: pathlib.Path) -> Any:
     if file.suffix.lower() not in _FOREIGN:
         return _egosgm._read_stored_image(file)
     _expect_file(os.fspath(file))
-    image = cv2.imread(os.fspath(file), cv2.IMREAD_ANYDEPTH | cv2.IMREAD_ANYCOLOR)
+    _, pages = cv2.imreadmulti(os.fspath(file), flags=cv2.IMREAD_ANYDEPTH | cv2.IMREAD_ANYCOLOR)
+    count = sum(page.shape == pages[0].shape for page in pages)  # another one is a thumbnail
+    if count > 1:
+        raise _refuse(f"{file}: holds {count} pictures: save each in a file of its own, as ImageMagick's `convert FILE %06d.png` does")
+    image = pages[0] if pages else None
     if image is None or image.dtype.name not in ("uint8", "uint16"):
-        raise _refuse(f"{file}: cannot be read as an image of 8 or 16 bits")
+        raise _refuse(f"{file}: cannot be read as an image of 8 or 16 bits" + ("" if image is None else f", as its pixels are {image.dtype}: save them as whole numbers"))
     return image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
 
 
