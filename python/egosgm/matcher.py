@@ -29,8 +29,8 @@ class Matcher:
         return f"<Matcher of {self.disparities} disparities from {self.min_disparity}>"
 
     def compute(self, left: NDArray[Any], right: NDArray[Any]) -> NDArray[np.int16]:
-        """A rectified pair of uint8 or uint16: grey, H x W, or colour as cv2.imread gives it, H x W x 3, BGR."""
-        left, right = (image[..., ::-1] if image.ndim == 3 and image.shape[2] == 3 else image for image in map(np.asarray, (left, right)))
+        """A rectified pair of uint8 or uint16: grey, H x W, or colour as cv2.imread gives it, H x W x 3 or 4, BGR or BGRA."""
+        left, right = (image[..., 2::-1] if image.ndim == 3 and image.shape[2] in (3, 4) else image for image in map(np.asarray, (left, right)))
         made_for = left.shape[:2], left.dtype
         if self._pipeline is None or made_for != self._made_for:
             if len(made_for[0]) != 2:

@@ -328,6 +328,8 @@ def test_the_matcher_has_opencvs_values(street, frames):
     np.testing.assert_array_equal(found, matcher.compute(*(np.dstack([image] * 3) for image in (frames[0].left, frames[0].right))))
     blue = np.dstack([frames[0].left, np.zeros((HEIGHT, WIDTH, 2), np.uint8)])  # as OpenCV has it; the least of a grey value
     np.testing.assert_array_equal(matcher.compute(blue, blue), matcher.compute(*[((3735 * blue[..., 0].astype(np.uint32) + (1 << 14)) >> 15).astype(np.uint8)] * 2))
+    colours = [np.dstack([255 - image[::-1], image, image // 2, image[:, ::-1]]) for image in (frames[0].left, frames[0].right)]  # BGRA
+    np.testing.assert_array_equal(matcher.compute(*colours), matcher.compute(*(image[..., :3] for image in colours)))
     assert matcher.compute(frames[0].left[:48], frames[0].right[:48]).shape == (48, WIDTH)
     eight, default = (egosgm.Matcher(disparities=48, **given).compute(frames[0].left, frames[0].right) for given in ({"paths": 8}, {}))
     np.testing.assert_array_equal(default, eight)
