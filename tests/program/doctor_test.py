@@ -223,6 +223,13 @@ class Doctor(InputTest):
             (street / "times.txt").unlink()
             self.assertIn(f"the {late} images are {words} late", self.assert_only_problem("moments", street)["text"])
 
+    def test_an_image_that_came_twice_and_made_all_later_ones_late(self):
+        street, frames = self.new_folder() / "street", 8
+        self.assert_works("synth", "--out", street, "--frames", frames, "--width", WIDTH, "--height", HEIGHT, "--seed", 7)
+        for i in range(frames - 1, 0, -1):
+            shutil.copy(street / f"image_1/{i - 1:06d}.png", street / f"image_1/{i:06d}.png")
+        self.assertIn("the right images are a frame late", self.assert_only_problem("moments", street)["text"])
+
     def test_a_camera_whose_images_are_in_reversed_order(self):
         street, frames = self.new_folder() / "street", 6
         self.assert_works("synth", "--out", street, "--frames", frames, "--width", WIDTH, "--height", HEIGHT, "--seed", 7)

@@ -184,11 +184,14 @@ def _moments(pairs: Dict[int, _Pair], places: Sequence[int]) -> List[Finding]:
     """A camera that stands still, or is some frames late, or pictures that come again. pairs: by their places."""
     laters = [_steps(pairs, places, lag) for lag in range(1, _MOST_LATE + 1)]
     steps = laters[0]
+    stands_still: List[Finding] = []
     for this, other in (("left", "right"), ("right", "left")):
         frozen = sum(np.ptp(getattr(b, this)) > 0 and np.array_equal(getattr(a, this), getattr(b, this)) and not np.array_equal(getattr(a, other), getattr(b, other)) for a, b in steps)
         if frozen:
-            return [Finding("problem", "moments", f"the {this} image is that of the frame before in {frozen} of {len(steps)} steps that were looked at, and the {other} "
+            stands_still = [Finding("problem", "moments", f"the {this} image is that of the frame before in {frozen} of {len(steps)} steps that were looked at, and the {other} "
                             "one is not", "leave such pairs out: they are of other moments")]
+            if 4 * frozen > len(steps):  # else an image that came twice may have made all later ones late
+                return stands_still
     own = float(np.median([_spread_px(b.left, b.right) for _, b in steps])) if steps else 0.0
     if own > _LEAST_LATE_PX:
         late = [(float(np.median([_spread_px(*views) for views in pairing])), lag, name) for lag, later in enumerate(laters, 1) if later
@@ -202,6 +205,8 @@ def _moments(pairs: Dict[int, _Pair], places: Sequence[int]) -> List[Finding]:
         if spread < min(0.5 * own, _MOST_PAIRED_PX):
             return [Finding("problem", "moments", f"the {name} images are {'a frame' if lag == 1 else f'{lag} frames'} late: so paired, rows agree within {spread:.2f} px, as they "
                             f"are within {own:.2f} px", f"leave out the first {counted(lag, 'image')} of that camera, and as many last ones of the other")]
+    if stands_still:
+        return stands_still
     repeated = sum(np.array_equal(a.left, b.left) and np.array_equal(a.right, b.right) for a, b in steps)
     return [Finding("note", "moments", f"both images are those of the frame before in {repeated} of {len(steps)} steps that were looked at",
                     "leave them out: nothing new is seen in them")] if repeated else []
