@@ -368,6 +368,8 @@ def test_a_fisheye(tmp_path):
     (f"fx: {F}\nfy: 460,0\ncx: {CX}\ncy: {CY}\nbaseline: {B}\n", "its fy is '460,0', not one finite number"),
     (f"fx: {F}\ncx: {CX}\ncy: {CY}\nbaseline: 300 mm\n", "its baseline is '300 mm', not one finite number: write it with a decimal point and without a unit"),
     (RAW["nested.yaml"].replace("- - 460.0", "- - 460,0"), "its left_matrix and right_matrix are not of finite numbers"),
+    *((kalibr(T_cn_cnm1=SHIFT, intrinsics=numbers), f"intrinsics {numbers} seem to be {order}") for numbers, order in (
+        ([F, CX, F + 1, CY], "fx, cx, fy, cy"), ([CX, CY, F, F], "cx, cy, fx, fy"), ([F, CX, CY, F], "fx, cx, cy, fy"))),
     (kalibr(T_cn_cnm1=SHIFT, resolution=[1280, 960]), "of two resolutions, 640x480 and 1280x960"),
     (json.dumps(dict(K1=K, D1=LENS, K2=K, D2=LENS, R=[0, 12, 0], T=[-B, 0, 0])), "calib.yaml: R is a vector of the length 12, more than half a turn"),
     (json.dumps(dict(K1=K, D1=LENS, K2=K, D2=LENS, R=[0.5, -1.2, 0.3], T=[-B, 0, 0])), "calib.yaml: R turns by 76 degrees"),

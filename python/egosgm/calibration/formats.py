@@ -36,7 +36,7 @@ def kalibr(data: Dict[str, Any], file: pathlib.Path) -> StereoRig:
         numbers = matrix(camera.data.get("distortion_coeffs"), ())
         if numbers is not None and numbers.size > 4 and numbers.any():
             raise chain.refuse(f", and distortion_coeffs of {name} are {numbers.size} numbers, not 4: does a decimal comma part one of them?")
-        cameras.append((of_four(camera.matrix((4,), "intrinsics", "camera_matrix")), *lens))
+        cameras.append((of_four(camera.four("intrinsics", "camera_matrix")), *lens))
     first, second = chain.part(data[left]), chain.part(data[right])
     if "T_cn_cnm1" in second.data:
         right_from_left = second.matrix((4, 4), "T_cn_cnm1")
@@ -52,7 +52,7 @@ def kalibr(data: Dict[str, Any], file: pathlib.Path) -> StereoRig:
 def euroc(files: List[pathlib.Path], contents: List[Dict[str, Any]]) -> StereoRig:
     """EuRoC's and Kimera's, a file for each camera."""
     both = [Values(data, file, "one camera of EuRoC or Kimera") for file, data in zip(files, contents)]
-    cameras = [(of_four(camera.matrix((4,), "intrinsics")),
+    cameras = [(of_four(camera.four("intrinsics")),
                 *camera.lens(camera.data.get("distortion_coefficients"), str(camera.data.get("distortion_model", "")))) for camera in both]
     return both[0].pair_on_body(cameras, [camera.matrix((4, 4), "T_BS") for camera in both], one_resolution(*both))
 

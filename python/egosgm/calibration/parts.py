@@ -111,6 +111,14 @@ class Values:
             raise self.refuse(f" and lacks {' or '.join(names)}, {int(np.prod(shape)) if shape else 'some'} finite numbers")
         return found
 
+    def four(self, *names: str) -> Matrix:
+        """fx, fy, cx and cy of a list. Throws InvalidArgument where they stand in another order: both focal lengths are alike, those of other places are not."""
+        found = self.matrix((4,), *names)
+        for order, x, y in (("fx, cx, fy, cy", 0, 2), ("cx, cy, fx, fy", 2, 3), ("fx, cx, cy, fy", 0, 3)):
+            if abs(found[0] - found[1]) > 0.05 * abs(found[0]) and abs(found[x] - found[y]) <= 0.01 * abs(found[x]):
+                raise self.refuse(f", and {names[0]} {found.tolist()} seem to be {order}: give fx, fy, cx, cy")
+        return found
+
     def numbers(self, names: str, prefix: str = "") -> Matrix:
         return np.array([self.matrix((1,), prefix + name)[0] for name in names.split()])
 
