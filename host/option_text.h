@@ -62,6 +62,7 @@ template <typename Number>
 void parse_number(std::string_view name, std::string_view text, Number& value, const char* allowed) {
   Number parsed{};
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), parsed);
+  if (error == std::errc::result_out_of_range) refuse(name, text, std::string(allowed) + " of 32 bits");
   if (error != std::errc() || end != text.data() + text.size()) refuse(name, text, allowed);
   value = parsed;
 }

@@ -164,7 +164,8 @@ TEST(Options, RefusesTextsThatAreNoValue) {
   }
   PipelineOptions options;
   expect_refused([&] { set_option(options, "disparities", "12.5"); }, {"a whole number"});
-  expect_refused([&] { set_option(options, "disparities", "99999999999"); }, {"a whole number"});
+  expect_refused([&] { set_option(options, "disparities", "99999999999"); }, {"a whole number of 32 bits"});
+  expect_refused([&] { set_option(options, "search_sigmas", "1e300"); }, {"a number of 32 bits"});
   expect_refused([&] { set_option(options, "search_sigmas", "many"); }, {"a number"});
   expect_refused([&] { set_option(options, "temporal", "maybe"); }, {"on or off"});
   expect_refused([&] { set_option(options, "cost", "census"); }, {"one of census9x7, census5x5, sad3x3"});
