@@ -52,8 +52,11 @@ inline std::string_view without_mark(std::string_view text) {
 }
 
 /// All rows of `file`, blank ones too; views into `text`, which may begin with the mark of UTF-8. Throws
-/// InvalidArgument where a row has more than 65,536 bytes or there are more than 2,000,000.
+/// InvalidArgument where it is UTF-16, a row has more than 65,536 bytes or there are more than 2,000,000.
 inline std::vector<TextRow> split_rows(std::string_view text, const std::filesystem::path& file) {
+  if (text.starts_with("\xff\xfe") || text.starts_with("\xfe\xff")) {
+    throw InvalidArgument(file.string() + ": is UTF-16, as some editors write: save it as UTF-8");
+  }
   std::vector<TextRow> rows;
   text = without_mark(text);
   for (int number = 1; !text.empty(); ++number) {

@@ -93,7 +93,7 @@ class WrongArguments(ProgramTest):
 
     def test_configuration_files(self):
         config = self.new_folder() / "config.toml"
-        for text, named in ((None, config), (b"p_1 = 3\n", "p1"), (b"# 1.2.3.4.5\n[constants.a.b.c.d]\np1 = 3\n", "config.toml:2: "), (b"#" * 65537, config), (bytes(range(256)), config),
+        for text, named in ((None, config), (b"p_1 = 3\n", "p1"), (b"# 1.2.3.4.5\n[constants.a.b.c.d]\np1 = 3\n", "config.toml:2: "), (b"#" * 65537, config), ("p2 = 100".encode("utf-16"), "is UTF-16"), (bytes(range(256)), config),
                             (b"# options\n\n[constants.banded_sgm]\np2 = 150\np9 = 1\n", "config.toml:5: "), (b"p2\n", "name = value"), (b"p2 150\n", "name = value"),
                             (b"# fine\n\n  dynamic\n", "name = value")):
             if text is not None:
@@ -213,6 +213,8 @@ class BrokenInput(ProgramTest):
         poses = self.new_folder() / "poses.txt"
         poses.write_text("\n".join([rows[0], "-1 0 0 0 0 1 0 0 0 0 1 0", *rows[2:]]) + "\n")
         self.assert_sequence_refused(self.street, f"{poses}:2", options=["--poses", poses])
+        poses.write_text("\n".join(rows), encoding="utf-16")
+        self.assert_sequence_refused(self.street, "poses.txt: is UTF-16", "save it as UTF-8", options=["--poses", poses])
         poses.write_text(rows[0] + "\n")
         self.assert_sequence_refused(self.street, poses, options=["--poses", poses])
         self.assert_sequence_refused(self.street, "nowhere", options=["--poses", "nowhere"])
