@@ -211,7 +211,7 @@ class StereoVideo:
                 raise _egosgm.InvalidArgument(f"pair {number}: is a {type(pair).__name__}{of}: give pairs (left, right), each an image; one alone is [(left, right)]")
             if any(image is None for image in pair):
                 raise _egosgm.InvalidArgument(f"pair {number}: holds None in place of an image, as a camera or cv2.imread gives where it has none: leave it out")
-            left, right = (np.array(image) for image in pair)  # copies: a camera may use its buffers again before the frame is handed out
+            left, right = (np.array(image, subok=True) for image in pair)  # copies, masks and all, which are refused: a camera may use its buffers again before the frame is handed out
             if not first and left.ndim >= 2 and os.path.isfile(self._calibration_file):
                 read_calibration(self._calibration_file, size=left.shape[1::-1])  # refused where it is of another size
             first = first or left.shape[:2]

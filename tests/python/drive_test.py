@@ -193,6 +193,7 @@ def test_what_is_wrong_with_a_folder_is_said_before_a_frame_is_read(street_folde
 @pytest.mark.parametrize("pairs, words", [
     ([GREY], "pair 0: is a ndarray"), ([(GREY, GREY), (GREY,)], "pair 1: is a tuple of 1"), ([(GREY, None)], "pair 0: holds None"), ([(GREY, GREY, 0.1)], "pair 0: is a tuple of 3"),
     ([(GREY, "right.png")], "pair 0: holds names"), ((["a.png"], ["b.png"]), "pair 0: holds names in place of images: one pair"), ((["a.png", "b.png"], ["c.png", "d.png"]), "pair 0: holds names"),
+    ([(np.ma.masked_equal(GREY, GREY[0, 0]), GREY)], "left has a mask"),
     ([(GREY, GREY), (SMALL, SMALL)], r"pair 1: its left image is of the shape \(40, 320\).*\(96, 320\): all need one size")], ids=lambda value: value if isinstance(value, str) else "")
 @pytest.mark.parametrize("motion", [True, False])
 def test_what_is_no_pair_is_said(pairs, words, motion, street):
