@@ -30,7 +30,7 @@ def of_pose(**fields):
     ("/left/image_rect", changed(height=0), "x0 px"), ("/left/image_rect", changed(height=HEIGHT - 1), "320x95 px, while the camera info is of 320x96"),
     ("/left/image_rect", changed(encoding="bayer_rgbg8"), "bayer_rgbg8"), ("/left/image_rect", changed(encoding="mono16", width=WIDTH // 2), "160x96"),
     ("/left/camera_info", changed(p=np.array([100.0, 52, 160, 0, 0, 100, 48, 0, 0, 0, 1, 0])), "/left/camera_info: P of the camera info has a skew of 52 px"),
-    ("/left/camera_info", changed(p=np.zeros(12)), "not calibrated"), ("/right/camera_info", changed(p=np.full(12, np.nan)), "P of the camera info holds a value that is not finite"),
+    ("/left/camera_info", changed(p=np.zeros(12)), "P of the camera info is zero: the cameras were calibrated one by one, or not at all"), ("/right/camera_info", changed(p=np.full(12, np.nan)), "P of the camera info holds a value that is not finite"),
     ("/left/camera_info", changed(width=0, height=0), "is of 0x0"), ("/left/camera_info", changed(d=np.full(5, np.nan)), "D of the camera info holds a value that is not finite"),
     ("/odom", of_pose(x=0.0, y=0.0, z=0.0, w=0.0), "no rotation"), ("/odom", of_pose(at_x=np.nan), "pose 0 is not finite"), ("/odom", of_pose(w=np.inf), "pose 0 is not finite")])
 def test_a_message_that_is_wrong_is_one_line(topic, change, named, tmp_path, street, frames, capfd):
