@@ -29,7 +29,7 @@ constexpr const char* kWeb =
     "in Python takes a generator of pairs";
 
 std::string archive(const char* kind) {
-  return std::string("it is ") + kind + ": unpack it, and give the folder that it holds";
+  return std::string("it is ") + kind + ": unpack it, and give the folder or the pictures that it holds";
 }
 
 bool is_named_as_video(const fs::path& file) {

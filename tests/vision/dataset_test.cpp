@@ -459,22 +459,23 @@ TEST_F(DatasetTest, WhatARunWroteIsNoInput) {
 }
 
 TEST_F(DatasetTest, WhatIsGivenInPlaceOfAFolderIsNamed) {
-  const std::pair<std::string, std::string> kinds[] = {{"PK\x03\x04rest", "a zip archive: unpack it"},
-                                                       {"\x1f\x8b\x08rest", "packed by gzip: unpack it"},
-                                                       {std::string(257, 'x') + "ustar", "a tar archive: unpack it"},
-                                                       {std::string("\0\0\0\x18", 4) + "ftypmp42", "is a video"},
-                                                       {std::string("\0\0\0\x18", 4) + "ftypheic", "a HEIC"},
-                                                       {"GIF89a", "a GIF"},
-                                                       {"\xff\xd8\xff", "under another name: name it"},
-                                                       {std::string("\0\0\0\x0cjP  ", 8), "JPEG 2000"},
-                                                       {"\x93NUMPY", "an array of NumPy"},
-                                                       {kOwnCalibration, "is a calibration: give the folder"},
-                                                       {"\x89MCAP0", "name it .mcap"},
-                                                       {"#ROSBAG V2.0", ".bag or .db3"},
-                                                       {"FLV\x01rest", "is a video"},
-                                                       {"\x30\x26\xb2\x75rest", "is a video"},
-                                                       {"Pf\n2 2\n-1\n", "a map of floats"},
-                                                       {"rosbag2_bagfile_information:", "give the folder"}};
+  const std::pair<std::string, std::string> kinds[] = {
+      {"PK\x03\x04rest", "a zip archive: unpack it"},
+      {"\x1f\x8b\x08rest", "packed by gzip: unpack it, and give the folder or the pictures"},
+      {std::string(257, 'x') + "ustar", "a tar archive: unpack it"},
+      {std::string("\0\0\0\x18", 4) + "ftypmp42", "is a video"},
+      {std::string("\0\0\0\x18", 4) + "ftypheic", "a HEIC"},
+      {"GIF89a", "a GIF"},
+      {"\xff\xd8\xff", "under another name: name it"},
+      {std::string("\0\0\0\x0cjP  ", 8), "JPEG 2000"},
+      {"\x93NUMPY", "an array of NumPy"},
+      {kOwnCalibration, "is a calibration: give the folder"},
+      {"\x89MCAP0", "name it .mcap"},
+      {"#ROSBAG V2.0", ".bag or .db3"},
+      {"FLV\x01rest", "is a video"},
+      {"\x30\x26\xb2\x75rest", "is a video"},
+      {"Pf\n2 2\n-1\n", "a map of floats"},
+      {"rosbag2_bagfile_information:", "give the folder"}};
   for (const auto& [content, named] : kinds) {
     add_text("drive.dat", content);
     refuses("drive.dat", {"drive.dat: is no folder; it is", named});
