@@ -181,6 +181,11 @@ def test_too_few_views_sides_and_units_are_named(pictures, tmp_path, capsys):
     assert "1 image without the other camera's left out" in calibrate(few, tmp_path / "calib.yml", capsys)[1]
     assert program.run_tool([*command(few, tmp_path / "calib.yml"), "--dictionary", "DICT_5X5_50"]) == 2
     assert "a chessboard has no markers: give --marker" in capsys.readouterr().err
+    for side in ("left", "right"):
+        for i in range(8):
+            shutil.copy(pictures / side / f"{i % 2}.png", few / side / f"{i}.png")
+    code, said = calibrate(few, tmp_path / "calib.yml", capsys)
+    assert code == 2 and "the board stands in 2 places in the 8 views of it" in said, said
     swapped = ["calibrate", "--left", str(pictures / "right/*.png"), "--right", str(pictures / "left/*.png"), "--board", "7x5", "--out", str(tmp_path / "calib.yml")]
     assert program.run_tool([*swapped, "--square", "0.03"]) == 2
     assert "left and right are swapped" in capsys.readouterr().err

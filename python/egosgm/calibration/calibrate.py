@@ -18,6 +18,7 @@ from .rectification import StereoRig, projections
 
 _FEWEST_VIEWS, _MANY_VIEWS, _MOST_VIEWS = 5, 15, 40  # the time grows with their cube
 _BAD_VIEW = 3.0  # times the median error of all views
+_SAME_PLACE = 0.01  # of the width, between a board's corners in two views
 _LEAST_BAD_PX = 0.3  # no view with a smaller error is bad
 _MOST_LEFT_OUT = 0.3  # of the views; where more are bad, something else is wrong
 _CELLS = (8, 6)  # of the image, for its coverage
@@ -96,6 +97,19 @@ def _in_one_order(left: Corners, right: Corners) -> Corners:
     return {last - number: place for number, place in right.items()} if (left[last] - left[0]) @ (right[last] - right[0]) < 0 else right
 
 
+def _places(views: Sequence[_View], most_px: float) -> int:
+    """How many of the views show the board elsewhere than all before them."""
+    places: List[Corners] = []
+    for view in views:
+        corners = view.corners[0]
+        apart = [max((float(np.abs(corners[number] - other[number]).max()) for number in corners.keys() & other), default=np.inf) for other in places]
+        if min(apart, default=np.inf) > most_px:
+            places.append(corners)
+        if len(places) == _FEWEST_VIEWS:
+            break
+    return len(places)
+
+
 class _Views:
     """The pairs, and the board in them."""
 
@@ -125,6 +139,10 @@ class _Views:
                 _egosgm._write_new_file(pathlib.Path(given.pictures) / f"{self.pairs:06d}.png", cv2.imencode(".png", picture)[1].tobytes())
             self.pairs += 1
         self.note = pairs.note
+        places = _places(self.views, _SAME_PLACE * (self.size or (0, 0))[0])
+        if places < _FEWEST_VIEWS <= len(self.views):
+            raise _egosgm.InvalidArgument(f"the board stands in {counted(places, 'place')} in the {len(self.views)} views of it, which tells nothing of the lenses; {_FEWEST_VIEWS} are needed: "
+                                          "move and tilt it between the pictures")
         if len(self.views) < _FEWEST_VIEWS:
             there = other_size(without, columns, rows) if not board.is_charuco and not self.views else None
             hint = f"; one of {there[0]}x{there[1]} is there: inner corners count, where four squares meet" if there else \
