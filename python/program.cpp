@@ -86,6 +86,7 @@ class PackageSource : public vision::FrameSource {
       for (;;) {
         const py::object found = source_.call("next");
         if (found.is_none()) {
+          has_ended_ = true;
           if (has_given_) return std::nullopt;
           throw InvalidArgument(
               fmt::format("--frames: {} has {} frames, which begin with 0", sequence_.title, last_ + 1));
@@ -115,6 +116,9 @@ class PackageSource : public vision::FrameSource {
     return in_python([&] {
       std::vector<std::string> notes;
       for (const py::handle& note : source_.call("notes")) notes.push_back(text_from(note));
+      if (has_ended_ && range_.last.value_or(last_) > last_) {
+        notes.push_back(fmt::format("--frames asks for frame {}, and the last one is {}", *range_.last, last_));
+      }
       return notes;
     });
   }
@@ -133,7 +137,7 @@ class PackageSource : public vision::FrameSource {
   std::filesystem::path out_;
   std::string poses_;
   int last_ = -1;  // frame that the source gave
-  bool has_given_ = false;
+  bool has_given_ = false, has_ended_ = false;
 };
 
 /// egosgm.bag.program.Outputs.

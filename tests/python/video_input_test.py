@@ -47,6 +47,8 @@ def test_the_maps_are_those_of_the_rectified_sequence(is_one, is_raw, videos, ca
 def test_without_a_calibration_there_are_disparities_and_no_poses(videos, tmp_path, told):
     told("run", "--left", videos[0], "--right", videos[1], "--frames", "1:", "--out", tmp_path / "out", *SET)
     assert [file.name for file in sorted((tmp_path / "out/disparity").iterdir())] == ["000001.png", "000002.png"]
+    said = told("run", *videos[:2], "--frames", "1:9", "--out", tmp_path / "fewer", *SET)
+    assert "--frames asks for frame 9, and the last one is 2" in said, said
     assert not (tmp_path / "out/poses.txt").exists() and not (tmp_path / "out/calibration.txt").exists()
     assert egosgm.read_disparity(tmp_path / "out/disparity/000001.png").shape == (HEIGHT, WIDTH)
 
