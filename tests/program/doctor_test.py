@@ -179,7 +179,7 @@ class Doctor(InputTest):
         self.assertEqual(self.examine(street)["times"]["verdict"], "note")
 
     def test_small_images_are_too_small_and_nothing_else(self):
-        for height, width in ((5, 7), (8, 8), (24, 32), (62, 100)):
+        for height, width in ((5, 7), (8, 8), (24, 32), (62, 100), (70, 200)):
             street = self.changed_street(lambda image: image[20:20 + height, 100:100 + width])
             (street / "calib.txt").write_text(f"fx = {width}\nfy = {width}\ncx = {(width - 1) / 2}\ncy = {(height - 1) / 2}\nbaseline_m = 0.5\n")
             found = self.examine(street)

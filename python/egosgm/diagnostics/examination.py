@@ -9,7 +9,7 @@ from .. import _egosgm
 from ..arguments import counted
 
 _FEATURES, _FAST_THRESHOLD = 3000, 12
-_MARGIN_PX = 31  # of an image, in which no points are looked for
+_MARGIN_PX, _LEAST_PLACE_PX = 31, 10  # of an image, in which no points are looked for; and what is left then
 _MOST_DESCRIPTOR_DISTANCE = 50  # of 256 bits
 _FEWEST_FOR_EPIPOLAR = 16  # below this a fundamental matrix says nothing
 _EPIPOLAR_PX, _RETURN_PX = 1.5, 0.3
@@ -233,8 +233,8 @@ class Examination:
         return best if shares[best] >= max(_SURE_OF_CHANGE, 2 * shares[second]) else ""
 
     def is_too_small(self) -> bool:
-        """Whether the images have no place where points are looked for. REQUIRES: add() was called."""
-        return min(self._width, self._height) <= 2 * _MARGIN_PX
+        """Whether the images have hardly a place where points are looked for. REQUIRES: add() was called."""
+        return min(self._width, self._height) <= 2 * _MARGIN_PX + _LEAST_PLACE_PX
 
     def _has_contrast(self) -> bool:
         return float(np.median(self._contrasts)) >= _LEAST_CONTRAST
