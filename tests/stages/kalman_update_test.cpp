@@ -259,11 +259,11 @@ TEST(KalmanUpdate, EvidenceAddsUpAndDecays) {
   EXPECT_EQ(judged({.predicted = 5, .measured = 5, .before = 128, .now = 400}).evidence, 160) << "at most";
   EXPECT_EQ(judged({.measured = 5, .now = 72}), (Judged{{5, 1}, 0})) << "chosen: just alive";
   EXPECT_EQ(judged({.measured = 5, .now = 71}), (Judged{kNothing, 0}));
-  EXPECT_EQ(judged({.measured = 5, .now = 24, .found = 9}), (Judged{{5, 1}, 0})) << "the coarse match found it, too";
-  EXPECT_EQ(judged({.measured = 5, .now = 24, .found = 9.5f}), (Judged{kNothing, 0})) << "but not that";
-  EXPECT_EQ(judged({.predicted = 5, .measured = 6, .before = 64, .now = 40, .found = 9.5f}).evidence, 45 + 40 - 48)
+  EXPECT_EQ(judged({.measured = 5, .now = 24, .found = 11}), (Judged{{5, 1}, 0})) << "the coarse match found it, too";
+  EXPECT_EQ(judged({.measured = 5, .now = 24, .found = 11.5f}), (Judged{kNothing, 0})) << "but not that";
+  EXPECT_EQ(judged({.predicted = 5, .measured = 6, .before = 64, .now = 40, .found = 11.5f}).evidence, 45 + 40 - 48)
       << "the coarse match contradicts it";
-  EXPECT_EQ(judged({.predicted = 5, .measured = 6, .before = 64, .now = 40, .found = 9}).evidence, 45 + 40 - 24);
+  EXPECT_EQ(judged({.predicted = 5, .measured = 6, .before = 64, .now = 40, .found = 11}).evidence, 45 + 40 - 24);
   EXPECT_EQ(judged({.predicted = 5, .measured = 9, .before = 128, .now = 90}).evidence, 90 - 72)
       << "contradicted: what was believed does not count";
   EXPECT_EQ(judged({.predicted = 5, .measured = 9, .before = 128, .now = 71}), (Judged{{5, 1}, 90 - 24}))
@@ -304,9 +304,9 @@ TEST(KalmanUpdate, ARepeatedPairMakesNobodySurer) {
 }
 
 TEST(KalmanUpdate, WhereTheCameraStandsAPixelBeginsWhatIsSharedAndFoundInTheWholeRange) {
-  EXPECT_EQ(judged({.measured = 5, .now = 96, .found = 9, .sees_again = true, .supporters = 12}),
+  EXPECT_EQ(judged({.measured = 5, .now = 96, .found = 11, .sees_again = true, .supporters = 12}),
             (Judged{{5, 1}, 96 - 24}));
-  EXPECT_EQ(judged({.measured = 5, .now = 96, .found = 9, .sees_again = true, .supporters = 11}),
+  EXPECT_EQ(judged({.measured = 5, .now = 96, .found = 11, .sees_again = true, .supporters = 11}),
             (Judged{kNothing, 0}));
   EXPECT_EQ(judged({.measured = 5, .now = 160, .sees_again = true, .supporters = 12}), (Judged{kNothing, 0}))
       << "the coarse match did not find it";
