@@ -296,7 +296,7 @@ TEST_P(OverlappedFaultTest, TheVerticalOffsetOfFramesThatFailedIsForgotten) {
   pipeline.reset();
   const int calls = count([&] { submit_frame(0), pipeline.collect(); });
   submit_frame(1);
-  arm(calls / 2);
+  arm(calls / 4);
   const auto frame_that_fails = [&] {
     submit_frame(2);
     faults_.disarm();

@@ -44,9 +44,10 @@ TEST(Method, BuildsWhatItsOptionsNeed) {
   asked.method.prepare(PixelType::kU8, {Output::kDynamic});
   EXPECT_TRUE(asked.has("dynamic_map.cl"));
   for (const char* file : {"right_map.cl", "read_off.cl"}) {
-    EXPECT_FALSE(Built().has(file)) << file;
-    EXPECT_TRUE(Built([](auto& o) { o.track_right = false; }).has(file)) << file;
+    EXPECT_FALSE(Built([](auto& o) { o.coarse_match.enabled = false; }).has(file)) << file;
+    EXPECT_TRUE(Built([](auto& o) { o.track_right = o.coarse_match.enabled = false; }).has(file)) << file;
   }
+  EXPECT_TRUE(Built().has("read_off.cl"));
   const Built paper([](auto& o) { o = MethodOptions(PipelineOptions::paper()); });
   EXPECT_TRUE(paper.has("sad_check.cl"));
   for (const char* file : {"coarse_match.cl", "median_filter.cl", "vertical_alignment.cl"}) {

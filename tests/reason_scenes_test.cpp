@@ -218,7 +218,7 @@ struct Noise {
   int sigma_grey;
   double slack;  // of the bounds, which are those of little noise
 };
-constexpr Noise kNoise[] = {{0, 0.001}, {1, 0}, {2, 0.001}, {4, 0.065}};
+constexpr Noise kNoise[] = {{0, 0.001}, {1, 0.003}, {2, 0.001}, {4, 0.065}};
 
 class ReasonScenes : public ::testing::TestWithParam<std::tuple<Case, Noise>> {};
 

@@ -89,7 +89,7 @@ class Run(ProgramTest):
             self.assertGreater(frame["ms"]["total"], 0)
             self.assertIn("BandedSgm", frame["ms"])
         first, later = report["frames"][0], report["frames"][-1]
-        two_with_coarse_ones = 2 * (1 + 1 / 64)
+        two_with_coarse_ones = 2 * (1 + 1 / 128)  # of the left view
         self.assertEqual((first["search_fraction"], first["searched_everything"], first["unpredicted"]), (two_with_coarse_ones, True, "first frame"))
         self.assertIsNone(first["odometry"]["motion"])
         self.assertLess(later["search_fraction"], 0.5)
