@@ -131,11 +131,13 @@ def test_a_pair_that_comes_twice_is_left_out(tmp_path, street, frames):
     assert bag.gaps.text() == "1 pairs have the stamp of the one before, and are left out"
 
 
-def test_without_stamps_the_times_of_the_recording_are_taken(tmp_path, street, frames):
+@pytest.mark.parametrize("unset", [SIDES, SIDES[:1], SIDES[1:]])
+def test_without_stamps_the_times_of_the_recording_are_taken(unset, tmp_path, street, frames):
     recording = drive_of(street, [])
     for side, name in enumerate(SIDES):
         for i in range(FRAMES):
-            recording.image(f"/{name}/image_rect", 0, (frames[i].left, frames[i].right)[side], received=START + i * RATE_NS + 1_000_000 * side)
+            received = START + i * RATE_NS + 1_000_000 * side
+            recording.image(f"/{name}/image_rect", 0 if name in unset else received, (frames[i].left, frames[i].right)[side], received=received)
     path = recording.write(tmp_path / "drive")
     bag = bags.Bag(path, "/left/image_rect", "/right/image_rect", max_skew_ms=1)
     found = list(bag.frames())

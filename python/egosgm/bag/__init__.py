@@ -181,7 +181,8 @@ class Bag:
         pairing.gaps.parts = list(self._parts.notes)
         with self._opened() as reader:
             self.cameras = self._find_cameras(reader)
-            pairing.gaps.has_no_stamps = all(stamp_ns(m) == 0 for m in itertools.islice(self._first_messages(reader, self.images[0]), 2))
+            of_sides = [[stamp_ns(m) for m in itertools.islice(self._first_messages(reader, topic), 2)] for topic in self.images]
+            pairing.gaps.has_no_stamps = any(stamps and not any(stamps) for stamps in of_sides)
             yield from _Reading(self, reader, pairing).frames()
 
     def _read_poses(self, reader: Any) -> Tuple[List[int], List[NDArray[np.float64]]]:
