@@ -82,6 +82,12 @@ def read_json(file: pathlib.Path) -> Any:
     return json.loads(_egosgm._read_json(file))
 
 
+def left_of_run(folder: pathlib.Path, name: str, recorded: str) -> str:
+    """A frame's left image: where it lay when the run was made, else the one that the run wrote, whose folder may be another one now."""
+    own = folder / "left" / f"{name}.png"
+    return os.fspath(own) if own.exists() and not os.path.exists(recorded) else recorded
+
+
 def comparison_parser(command: str, description: str, estimate_help: str, truth_help: str) -> Parser:
     """COMMAND ESTIMATE TRUTH, or --estimate and --truth, or one of each kind; and --frames."""
     parser = Parser(command, usage=f"egosgm {command} [OPTIONS] [ESTIMATE] [TRUTH]", description=description)

@@ -14,7 +14,7 @@ import numpy
 import PIL.Image
 
 from . import _egosgm
-from .arguments import counted, Parser, read_json, tell, text_argument, whole_number
+from .arguments import counted, left_of_run, Parser, read_json, tell, text_argument, whole_number
 from .moving_objects import ObjectPictures
 
 _PICTURES = 6
@@ -147,13 +147,13 @@ class _Values:
 
 
 class _Frame:
-    def __init__(self, place: int, entry: Dict[str, Any]) -> None:
+    def __init__(self, folder: pathlib.Path, place: int, entry: Dict[str, Any]) -> None:
         self.place = place  # among all of the run
         self.entry = entry
         self.number = entry["frame"]
         self.name = entry["name"] if isinstance(entry.get("name"), str) else f"{self.number:06}"
-        self.image = pathlib.Path(entry["left"]).stem if isinstance(entry.get("left"), str) else ""
-        self.left = entry["left"] if self.image and pathlib.Path(entry["left"]).exists() else ""
+        left = left_of_run(folder, self.name, entry["left"] if isinstance(entry.get("left"), str) else "")
+        self.left = left if pathlib.Path(left).is_file() else ""
         self.truth = ""
 
 
@@ -164,7 +164,7 @@ class _Page:
         self._given = given
         self._folder = pathlib.Path(given.run)
         self._run = _read_run(self._folder)
-        self._of_run = [_Frame(place, entry) for place, entry in enumerate(self._run["frames"])]
+        self._of_run = [_Frame(self._folder, place, entry) for place, entry in enumerate(self._run["frames"])]
         self._panels = _egosgm._FramePanels(operator.index(self._run["options"].get("disparities", 128)))
         self._notes = [str(note) for note in self._run.get("notes", [])]
         first, last = _egosgm._parse_frame_range(text_argument(given.frames or ""))

@@ -198,6 +198,11 @@ class Report(ReportTest):
         self.assertEqual(data["run"]["input"], report["input"])
         self.assertEqual(data["pictures"][0]["layers"][0]["name"], "disparity")
         self.assertEqual(len(data["notes"]), 4)
+        shutil.copytree(self.street / "image_0", copy / "left")  # as a run of a bag writes them, before its folder is moved
+        (copy / "report.html").unlink()
+        self.assert_works("report", copy)
+        data = self.data(copy / "report.html")
+        self.assertEqual((data["pictures"][0]["layers"][0]["name"], len(data["notes"])), ("left image", 3))
 
     def test_what_is_no_run_is_refused(self):
         copy = self.copy_of_the_run()

@@ -52,6 +52,11 @@ def test_frames_meet_by_their_poses(run, capsys):
     np.testing.assert_allclose(rows["normal"], np.tile([0, 0, -1], (48, 1)), atol=1e-6)
     corner = (np.abs(rows["xyz"] - (-0.1, -0.05, 5)).max(axis=1) < 1e-4) | (np.abs(rows["xyz"] - (0.9, -0.05, 5)).max(axis=1) < 1e-4)
     assert corner.sum() == 2 and (rows["rgb"][corner] == 255).all() and (rows["rgb"][~corner] == 51).all()
+    (run / "left").mkdir()  # as a run of a bag writes them, before its folder is moved
+    for number in (0, 1):
+        (run.parent / f"left{number}.png").rename(run / f"left/{number:06d}.png")
+    assert cloud.main([str(run), "--voxel", "0.01", "--normals", "--out", str(run / "moved.ply")]) == 0
+    assert (run / "moved.ply").read_bytes() == (run / "cloud.ply").read_bytes()
 
 
 def test_poses_that_stand_still_for_want_of_a_motion_are_told(run, capsys):

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _egosgm
-from ..arguments import counted, decimal, Parser, read_json, tell
+from ..arguments import counted, decimal, left_of_run, Parser, read_json, tell
 from .points import cloud_of_maps, write_new_ply
 
 
@@ -46,7 +46,8 @@ def _frames_of(folder: pathlib.Path) -> Tuple[_egosgm.Calibration, List[Tuple[st
     report = read_json(file)
     try:
         calibration = _egosgm.Calibration(**report["calibration"])
-        frames = [(str(entry.get("name") or f"{entry['frame']:06d}"), os.fsdecode(entry["left"])) for entry in report["frames"]]
+        names = [str(entry.get("name") or f"{entry['frame']:06d}") for entry in report["frames"]]
+        frames = [(name, left_of_run(folder, name, os.fsdecode(entry["left"]))) for name, entry in zip(names, report["frames"])]
         lost = sum(entry["odometry"]["motion"] is None for entry in report["frames"][1:] if "odometry" in entry)
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise _egosgm.InvalidArgument(f"{file}: is no report of a run: {error}") from None
