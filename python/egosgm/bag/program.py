@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """What `egosgm run` takes of the package: frames of bags and videos, and calibrations in, recordings and a viewer out. The run itself is C++'s."""
+import contextlib
 import os
 import pathlib
 import sys
 import types
-from typing import Any, Dict, List, Optional, Sequence, Tuple
+from typing import Any, Dict, Iterator, List, Optional, Sequence, Tuple
 
 from .. import _egosgm
 from ..calibration import reader as calibrations
@@ -87,18 +88,30 @@ class Outputs:
             self._outputs.append(self._page_output(options))
 
     def take(self, frame: Dict[str, Any], maps: _egosgm.Frame, motion: Any) -> None:
-        for output in self._outputs:
-            output.add(types.SimpleNamespace(**frame), maps, motion, self._calibration)
+        with self._naming_the_file():
+            for output in self._outputs:
+                output.add(types.SimpleNamespace(**frame), maps, motion, self._calibration)
 
     def end(self, finished: bool) -> None:
         outputs, self._outputs = self._outputs, []
         try:
-            while finished and outputs:
-                outputs[0].finish()
-                outputs.pop(0)  # what is finished stays, whatever becomes of the others
+            with self._naming_the_file():
+                while finished and outputs:
+                    outputs[0].finish()
+                    outputs.pop(0)  # what is finished stays, whatever becomes of the others
         finally:
             for output in outputs:
                 output.give_up()
+
+    @contextlib.contextmanager
+    def _naming_the_file(self) -> Iterator[None]:
+        """A stream's own error does not name it."""
+        try:
+            yield
+        except OSError as error:
+            if isinstance(error, _egosgm.Error) or not (self._file and error.strerror):
+                raise
+            raise _egosgm.IoError(f"{self._file}: cannot be written: {error.strerror}; free some space or choose a folder that can be written") from error
 
 
 def main(arguments: Optional[Sequence[str]] = None) -> int:
