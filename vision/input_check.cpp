@@ -163,8 +163,8 @@ void InputCheck::add(const Image& left, const Image& right, const FrameReport& r
     const bool is_of_one_value = is_plain(side == 0 ? left : right);
     if (is_of_one_value) ++plain_[side];
     if (frames_ > 0 && stands_still && !is_of_one_value) ++frozen_[side];
+    if (side == 0 && digests[0] == digests[1] && !is_of_one_value) ++same_;
   }
-  if (digests[0] == digests[1]) ++same_;
   std::copy(std::begin(digests), std::end(digests), seen_);
   size_ = left.size();
   density_ += report.density;
@@ -189,7 +189,11 @@ std::string InputCheck::text() const {
     append(text, formatted("rows of the two views lie %g px apart, the most that is corrected, or farther",
                            static_cast<double>(EGOSGM_MAX_OFFSET_PX)));
   }
-  if (same_ == frames_) append(text, "the left and the right images are the same (give those of both cameras)");
+  if (same_ > 0) {
+    append(text,
+           formatted("the left and the right image are the same in %zu of %zu frames (give those of both cameras)",
+                     same_, frames_));
+  }
   for (const auto& [side, name] : {std::pair{0, "left"}, {1, "right"}}) {
     if (plain_[side] > 0) {
       append(text, formatted("the %s image is of one value in %zu frames (the camera was covered, dark or off)", name,

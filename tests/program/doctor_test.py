@@ -69,7 +69,7 @@ class Doctor(InputTest):
         chessboard = 64 * (numpy.indices((HEIGHT, WIDTH)).sum(0) % 2)
         two_levels = self.changed_street(lambda image: numpy.where(image + chessboard + random.integers(0, 9, image.shape) > 128, 255, 0))
         for check, words, run_says, street in (
-                ("matches", "are the same", "images are the same", same), ("images", "2 grey levels in all", "doctor", two_levels),
+                ("matches", "are the same", "are the same in 4 of 4 frames", same), ("images", "2 grey levels in all", "doctor", two_levels),
                 ("images", "both bytes of each pixel exchanged", "both bytes of each pixel are exchanged", self.wide(200, numpy.ndarray.byteswap)),
                 ("images", "no value above 255", "values of 8 bits in images of 16: `egosgm doctor", self.wide(1))):
             with self.subTest(words):
@@ -133,8 +133,10 @@ class Doctor(InputTest):
             self.assertIn("of nearly one tone", found["images"]["text"])
             self.assertNotIn("moments", found)
         self.assertIn("in 2 of 4 pairs that were looked at", found["images"]["text"])
+        shutil.copy(street / "image_0/000003.png", street / "image_1/000003.png")
         said = self.said_by_run(street)
         self.assertIn("the right image is of one value in 2 frames", said)
+        self.assertIn("the left and the right image are the same in 1 of 4 frames", said)
         self.assertNotIn("that of the frame before", said)
 
     def test_pairs_that_differ_from_each_other(self):
