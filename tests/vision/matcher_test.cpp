@@ -10,9 +10,12 @@
 #include "egosgm/pipeline.h"
 #include "egosgm/vision/opencv.h"
 #include "egosgm/vision/synthetic.h"
+#include "tests/support/expect_refused.h"
 
 namespace egosgm::vision {
 namespace {
+
+using testing::expect_refused;
 
 /// A frame of the street as callers of OpenCV have it.
 struct Pair {
@@ -151,9 +154,13 @@ TEST(Matcher, RefusesWhatHasNoMeaning) {
   EXPECT_THROW(matcher.compute(real, real, disparity), InvalidArgument);
   EXPECT_THROW(matcher.compute(cv::Mat(), frame.right, disparity), InvalidArgument);
   EXPECT_THROW(matcher.compute(frame.left, frame.right.colRange(0, 100), disparity), InvalidArgument);
+  frame.left.convertTo(real, CV_16U);
+  expect_refused([&] { matcher.compute(real, frame.right, disparity); }, {"160x64 of CV_16UC1", "160x64 of CV_8UC1"});
   PipelineOptions wide = few();
-  wide.min_disparity = 2000;
-  EXPECT_THROW(Matcher{wide}, InvalidArgument);
+  for (const int least : {2000, -2047}) {
+    wide.min_disparity = least;
+    expect_refused([&] { Matcher{wide}; }, {"do not fit into 16 bits", "-2046 to 2046 do"});
+  }
 }
 
 }  // namespace

@@ -53,7 +53,8 @@ inline void Matcher::expect_sixteenths(const PipelineOptions& options) {
   constexpr int kLargest = std::numeric_limits<std::int16_t>::max() / cv::StereoMatcher::DISP_SCALE;
   if (end > kLargest || options.min_disparity - 1 < -kLargest) {
     throw InvalidArgument("Matcher: disparities " + std::to_string(options.min_disparity) + " to " +
-                          std::to_string(end - 1) + " do not fit into 16 bits with 16 steps a pixel: up to " +
+                          std::to_string(end - 1) +
+                          " do not fit into 16 bits with 16 steps a pixel: " + std::to_string(1 - kLargest) + " to " +
                           std::to_string(kLargest - 1) + " do; Pipeline gives float");
   }
 }
@@ -107,9 +108,11 @@ inline void Matcher::compute(cv::InputArray left, cv::InputArray right, cv::Outp
                              const std::optional<Motion>& motion) {
   const cv::Mat left_grey = grey_of(left.getMat(), "left"), right_grey = grey_of(right.getMat(), "right");
   if (left_grey.size() != right_grey.size() || left_grey.type() != right_grey.type()) {
-    throw InvalidArgument("Matcher: the left image is " + std::to_string(left_grey.cols) + "x" +
-                          std::to_string(left_grey.rows) + ", the right one " + std::to_string(right_grey.cols) + "x" +
-                          std::to_string(right_grey.rows) + ": both need one size and depth");
+    const auto text_of = [](const cv::Mat& image) {
+      return std::to_string(image.cols) + "x" + std::to_string(image.rows) + " of " + cv::typeToString(image.type());
+    };
+    throw InvalidArgument("Matcher: the left image is " + text_of(left_grey) + ", the right one " +
+                          text_of(right_grey) + ": both need one size and depth");
   }
   prepare(left_grey.size(), left_grey.type());
   cv::Mat map(left_grey.size(), CV_32FC1);
