@@ -27,9 +27,10 @@ def of_pose(**fields):
     ("/left/image_rect", changed(step=WIDTH - 1), "rows of"), ("/right/image_rect", changed(data=np.zeros(10, np.uint8)), "has 10 bytes"),
     ("/right/image_rect", changed(data=np.zeros(0, np.uint8)), "has 0 bytes"), ("/left/image_rect", changed(height=2**32 - 1), "4294967295"),
     ("/left/image_rect", changed(width=2**32 - 1, step=2**32 - 1), "4294967295"), ("/left/image_rect", changed(width=0), "an image of 0x96 px"),
-    ("/left/image_rect", changed(height=0), "x0 px"), ("/left/image_rect", changed(height=HEIGHT - 1), "320x95 px, while the camera info is of 320x96"),
+    ("/left/image_rect", changed(height=0), "x0 px"), ("/left/image_rect", changed(height=HEIGHT - 1), "320x95 px, while the camera info is of 320x96: where all are, give their calibration by --calib"),
     ("/left/image_rect", changed(encoding="bayer_rgbg8"), "bayer_rgbg8"), ("/left/image_rect", changed(encoding="mono16", width=WIDTH // 2), "160x96"),
     ("/left/camera_info", changed(p=np.array([100.0, 52, 160, 0, 0, 100, 48, 0, 0, 0, 1, 0])), "/left/camera_info: P of the camera info has a skew of 52 px"),
+    ("/left/camera_info", changed(p=np.array([-100.0, 0, 160, 0, 0, 100, 48, 0, 0, 0, 1, 0])), "P of the camera info has an fx of -100 px"),
     ("/left/camera_info", changed(p=np.zeros(12)), "P of the camera info is zero: the cameras were calibrated one by one, or not at all"), ("/right/camera_info", changed(p=np.full(12, np.nan)), "P of the camera info holds a value that is not finite"),
     ("/left/camera_info", changed(width=0, height=0), "is of 0x0"), ("/left/camera_info", changed(d=np.full(5, np.nan)), "D of the camera info holds a value that is not finite"),
     ("/odom", of_pose(x=0.0, y=0.0, z=0.0, w=0.0), "no rotation"), ("/odom", of_pose(at_x=np.nan), "pose 0 is not finite"), ("/odom", of_pose(w=np.inf), "pose 0 is not finite")])

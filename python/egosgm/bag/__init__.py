@@ -266,8 +266,9 @@ class _Reading:
         try:
             image = grey_of(message)
             if image.shape != (self._cameras.size[1], self._cameras.size[0]):
-                raise _egosgm.InvalidArgument(f"an image of {image.shape[1]}x{image.shape[0]} px, while the camera info is of "
-                                              f"{self._cameras.size[0]}x{self._cameras.size[1]}")
+                of, remedy = ("first image", "") if self._bag._calib else ("camera info", ": where all are, give their calibration by --calib")
+                raise _egosgm.InvalidArgument(f"an image of {image.shape[1]}x{image.shape[0]} px, while the {of} is of "
+                                              f"{self._cameras.size[0]}x{self._cameras.size[1]}{remedy}")
             return image
         except (_egosgm.InvalidArgument, ValueError) as error:
             self._note_broken(topic, stamp, error)

@@ -153,10 +153,11 @@ def _check(info: Any, name: str) -> None:
             raise _egosgm.InvalidArgument(f"{name}: {field} of the camera info holds a value that is not finite")
         if field == "D" and values.size not in (0, 4, 5, 8, 12, 14):
             raise _egosgm.InvalidArgument(f"{name}: D of the camera info has {values.size} values, not 0, 4, 5, 8, 12 or 14")
-    if not _values(info, "P")[0] > 0:
-        raise _egosgm.InvalidArgument(f"{name}: P of the camera info is zero: the cameras were calibrated one by one, or not at all; calibrate both at once, "
+    focal = _values(info, "P")[0]
+    if not focal > 0:
+        raise _egosgm.InvalidArgument(f"{name}: P of the camera info {f'has an fx of {focal:g} px' if focal else 'is zero'}: the cameras were calibrated one by one, or not at all; calibrate both at once, "
                                       "as `egosgm calibrate` does, or give the pair's calibration (of a bag, --calib)")
-    if abs(_values(info, "P")[1]) > 1e-3 * _values(info, "P")[0]:
+    if abs(_values(info, "P")[1]) > 1e-3 * focal:
         raise _egosgm.InvalidArgument(f"{name}: P of the camera info has a skew of {_values(info, 'P')[1]:g} px, which no rectified camera has")
 
 
