@@ -305,6 +305,8 @@ def _of_list(file: pathlib.Path) -> RawPairs:
         pairs.append((file.parent / words[0], file.parent / words[1], float(words[2]) if len(words) == 3 else None))
     if not pairs:
         raise _refuse(f"{file}: lists no pair")
+    if len({pair[2] is None for pair in pairs}) > 1:
+        raise _refuse(f"{file}: has SECONDS in some rows only: give them in all, or in none")
     return _Listed(pairs)
 
 
