@@ -96,6 +96,8 @@ class LivePairs:
             atexit.unregister(self._end)
 
     def __iter__(self) -> Iterator[Tuple[Any, Any]]:
+        if self._has_ended and self._newest is None and not self._error:
+            raise _egosgm.InvalidArgument("the input has ended, and gives its pairs once: make LivePairs anew")
         while True:
             with self._changed:
                 self._changed.wait_for(lambda: self._newest is not None or self._has_ended)

@@ -93,6 +93,7 @@ def test_pairs_that_nobody_asked_for_are_dropped_and_the_newest_is_given(frames,
     np.testing.assert_array_equal(left, frames[-1].left)
     np.testing.assert_array_equal(right, frames[-1].right)
     assert pairs.dropped == FRAMES - 1 and "0 gives no more images" in pairs.note
+    expect_refused("gives its pairs once", lambda: list(pairs))
 
 
 def test_a_result_comes_before_the_next_pair_is_asked_for(street, cameras, calib):
