@@ -104,8 +104,15 @@ void bind_values(py::module_& module) {
   module.def("devices", &devices, py::call_guard<py::gil_scoped_release>(),
              "All OpenCL devices, in the order in which they are preferred.");
   module.def(
-      "pipeline_options", [](const std::string& preset) { return dict_of(options_of_preset(preset)); },
-      py::arg("preset") = "default", "All options of Pipeline by name, with the values of a preset.");
+      "pipeline_options",
+      [](const std::string& preset, const py::kwargs& values) {
+        PipelineOptions options = options_of_preset(preset);
+        set_options(options, values);
+        options.validate();
+        return dict_of(options);
+      },
+      py::arg("preset") = "default",
+      "All options of Pipeline by name, with the values of a preset, and those that are given.");
   module.def(
       "_option_texts",
       [] {

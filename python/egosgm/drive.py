@@ -44,7 +44,7 @@ _OF_PIPELINE = ("device", "cache", "constants")
 def _expect_names(options: Dict[str, Any]) -> None:
     known = (*_OWN, *_OF_PIPELINE, *_egosgm.pipeline_options())
     for name in options:
-        if name not in known:
+        if name not in known and not name.startswith("constants."):
             raise _egosgm.InvalidArgument(f'no option named "{name}": choose from {", ".join(known)}')
 
 

@@ -236,9 +236,7 @@ def _options(words: Sequence[str]) -> Any:
         name, is_there, value = word.partition("=")
         if not (name and is_there and value):
             raise _egosgm.InvalidArgument(f"--set {word}: give NAME=VALUE")
-        if name not in _egosgm.pipeline_options() and not name.startswith("constants."):  # run() has names of its own
-            raise _egosgm.InvalidArgument(f"--set {word}: no option of this name: choose from {', '.join(_egosgm.pipeline_options())}")
-        options[name.replace(".", "__")] = value
+        options[name] = value
     return options
 
 
@@ -247,6 +245,7 @@ def main(arguments: Sequence[str]) -> int:
     if not 0 <= given.port < 65536:
         raise _egosgm.InvalidArgument(f"--port {given.port}: choose from 0 to 65535")
     options = _options(given.set)
+    known = _egosgm.pipeline_options(**options)
     if len(given.cameras) == 1:
         raise _egosgm.InvalidArgument(f"{given.cameras[0]}: one camera: say how its views lie, by --side-by-side or --top-bottom, or give a right one too")
     if given.cameras:
@@ -279,7 +278,7 @@ def main(arguments: Sequence[str]) -> int:
             rate = (len(shown_s) - 1) / max(shown_s[-1] - shown_s[0], 1e-9)
             state = f"{rate:.1f} pairs/s, {1000 * (shown_s[-1] - pairs.taken_s):.0f} ms old, {pairs.dropped} dropped"
             if page:
-                page.show(picture_of(frame.left, frame.disparity, int(options.get("min_disparity", 0)), int(options.get("disparities", 128))), state)
+                page.show(picture_of(frame.left, frame.disparity, known["min_disparity"], known["disparities"]), state)
             if viewer:
                 viewer.add(frame, frame.maps, frame.motion, frame.calibration)
             if record:

@@ -136,7 +136,7 @@ def test_videos_are_matched_shown_and_recorded(is_one, videos, calib, tmp_path, 
     shown = []
     monkeypatch.setattr(live.Page, "show", lambda page, picture, state: shown.append((picture, state)))
     source = ["--side-by-side", videos[2]] if is_one else videos[:2]
-    words = ["live", *source, "--calib", calib, "--record", str(tmp_path / "record"), "--set", "disparities=48", "--set", "paths=4"]
+    words = ["live", *source, "--calib", calib, "--record", str(tmp_path / "record"), "--set", "disparities=48", "--set", "constants.coarse_match.p1=7"]
     assert run_tool(words) == 0
     first, *states, last = capsys.readouterr().out.splitlines()
     assert first.startswith("http://127.0.0.1:") and f"egosgm run {tmp_path}/record" in last
@@ -319,7 +319,7 @@ def test_a_port_that_is_in_use_is_refused():
     ([], "one input"), (["drive.avi"], "drive.avi: one camera: say how its views lie, by --side-by-side"), (["0", "1", "2"], "0 1 2: too many cameras"),
     (["0", "1", "--left", "0"], "0 1: too many cameras"), (["--left", "0"], "one input"), (["--left", "0", "--right", "0"], "are one camera"), (["--side-by-side", "97"], "no camera that OpenCV can open"),
     (["--side-by-side", "none.mp4"], "no such file"), (["--side-by-side", __file__], "neither an image nor a video"), (["--left", "0", "--right", "1", "--set", "paths"], "NAME=VALUE"),
-    (["--left", "0", "--right", "1", "--set", "device=0"], "--set device=0: no option of this name: choose from preset, "), (["--side-by-side", "rtsp://camera/1"], "is an address"),
+    (["--left", "0", "--right", "1", "--set", "device=0"], 'no option named "device": choose from preset, '), (["--left", "0", "--right", "1", "--set", "paths=abc"], '"abc" is not'), (["--side-by-side", "rtsp://camera/1"], "is an address"),
     (["--left", "0", "--right", "1", "--record", str(pathlib.Path(__file__).parent)], "--record"), (["--left", "0", "--right", "1", "--port", "99999"], "--port 99999"),
     (["--left", "0", "--right", "1", "--unit", "inch"], "--unit inch"), (["--side-by-side", "/dev/v4l/by-id/none"], "no camera that OpenCV can open")])
 def test_what_is_wrong_is_one_line(words, says, calib, capsys):
