@@ -15,13 +15,15 @@ class Matcher:
     """
 
     def __init__(self, min_disparity: int = 0, disparities: int = 128, *, device: str = "", preset: str = "default", **options: Any) -> None:
-        if not (min_disparity > -2047 and min_disparity + disparities <= 2047):
-            raise _egosgm.InvalidArgument(f"disparities {min_disparity} to {min_disparity + disparities - 1} do not fit into 16 bits with 16 steps "
-                                          "a pixel; Pipeline gives float")
         if options.pop("temporal", False):
             raise _egosgm.InvalidArgument("temporal: a Matcher matches each pair alone: leave it out; Pipeline and run() predict")
-        self.min_disparity, self.disparities = min_disparity, disparities
-        self._options = {"device": device, "preset": preset, "paths": 8, **options, "min_disparity": min_disparity, "disparities": disparities, "temporal": False}
+        options = {"preset": preset, "paths": 8, **options, "min_disparity": min_disparity, "disparities": disparities, "temporal": False}
+        known = _egosgm.pipeline_options(**{name: value for name, value in options.items() if name != "cache"})
+        self.min_disparity, self.disparities = known["min_disparity"], known["disparities"]
+        end = self.min_disparity + self.disparities
+        if not (self.min_disparity > -2047 and end <= 2047):
+            raise _egosgm.InvalidArgument(f"disparities {self.min_disparity} to {end - 1} do not fit into 16 bits with 16 steps a pixel; Pipeline gives float")
+        self._options = {"device": device, **options}
         self._pipeline: Optional[_egosgm.Pipeline] = None
         self._made_for: Tuple[Any, ...] = ()
 

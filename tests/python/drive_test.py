@@ -337,7 +337,7 @@ def test_the_matcher_has_opencvs_values(street, frames):
     assert (eight != found).any()
     np.testing.assert_array_equal(egosgm.Matcher(disparities=48, paths=4, temporal=False).compute(frames[0].left, frames[0].right), found)
     for call, named in ((lambda: egosgm.Matcher(2000, 128), "do not fit"), (lambda: egosgm.Matcher(temporal=True), "matches each pair alone"), (lambda: matcher.compute(np.zeros(4, np.uint8), None), "H x W"),
-                        (lambda: egosgm.Matcher(p22=1).compute(frames[0].left, frames[0].right), "choose from")):
+                        (lambda: egosgm.Matcher(numDisparities=64), "choose from"), (lambda: egosgm.Matcher(0, 64.5), "64.5"), (lambda: egosgm.Matcher(0, None), "None")):
         expect_refused(named, call)
 
 
