@@ -155,14 +155,15 @@ void write_sequence(const SyntheticOptions& options, const std::filesystem::path
 
   std::vector<Eigen::Isometry3d> poses;
   std::string times, objects = std::string(kObjectColumns) + "\n";
+  const auto write_rows = [&] {
+    write_file(folder / "times.txt", times);
+    write_poses(folder / "poses.txt", poses);
+    if (options.moving_object) write_file(truth / "objects.csv", objects);
+  };
+  write_file(folder / "calib.txt", calibration_rows(sequence.calibration()));
   for (int k = 0; k < options.frames; ++k) {
     poses.push_back(sequence.world_from_camera(k));
     times += text(0.1 * k, "\n");
-  }
-  write_file(folder / "calib.txt", calibration_rows(sequence.calibration()));
-  write_file(folder / "times.txt", times);
-  write_poses(folder / "poses.txt", poses);
-  for (int k = 0; k < options.frames; ++k) {
     const std::string name = padded(std::to_string(k), 6) + ".png";
     write_frame(sequence.render(k), name, options.moving_object, folder);
     if (options.moving_object) {
@@ -177,9 +178,14 @@ void write_sequence(const SyntheticOptions& options, const std::filesystem::path
         }
       }
     }
-    if (progress) progress(k + 1, options.frames);
+    try {
+      if (progress) progress(k + 1, options.frames);
+    } catch (...) {  // whoever stops it has a shorter sequence
+      write_rows();
+      throw;
+    }
   }
-  if (options.moving_object) write_file(truth / "objects.csv", objects);
+  write_rows();
 }
 
 }  // namespace egosgm::vision

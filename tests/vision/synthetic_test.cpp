@@ -15,6 +15,7 @@
 #include "egosgm/error.h"
 #include "egosgm/image.h"
 #include "egosgm/vision/calibration_io.h"
+#include "egosgm/vision/dataset.h"
 #include "egosgm/vision/disparity_io.h"
 #include "egosgm/vision/image_io.h"
 #include "egosgm/vision/poses_io.h"
@@ -482,6 +483,16 @@ TEST_F(SyntheticFiles, SequenceReadsBackAsItWasRendered) {
   const std::vector<Eigen::Isometry3d> poses = read_poses(folder_ / "poses.txt");
   ASSERT_EQ(poses.size(), 2u);
   EXPECT_TRUE(poses[1].isApprox(sequence.world_from_camera(1), 1e-8));
+}
+
+TEST_F(SyntheticFiles, AProgressThatThrowsLeavesAShorterSequence) {
+  const auto stop = [](int done, int) {
+    if (done == 2) throw std::runtime_error("stopped");
+  };
+  EXPECT_THROW(write_sequence({.frames = 4, .width = 16, .height = 9}, folder_, stop), std::runtime_error);
+  const StereoSequence found = open_folder(folder_);
+  EXPECT_EQ(found.frames.size(), 2u);
+  EXPECT_EQ(poses_of_frames(found, found.poses_file).size(), 2u);
 }
 
 TEST_F(SyntheticFiles, FolderHoldsWhatIsPromisedAndNothingElse) {

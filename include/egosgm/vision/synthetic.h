@@ -111,7 +111,7 @@ class EGOSGM_EXPORT SyntheticSequence {
 ///   truth/seen_next/N.png                 likewise: 255 where the next left image shows the same point
 ///   truth/objects.csv                     likewise, after the last frame: SyntheticObject by frame and id
 /// Every file appears whole or not at all; existing ones are replaced. `progress(done, frames)` is called after each
-/// frame, if given. Throws as SyntheticSequence does, and IoError.
+/// frame, if given; what it throws ends the sequence there. Throws as SyntheticSequence does, and IoError.
 EGOSGM_EXPORT void write_sequence(const SyntheticOptions& options, const std::filesystem::path& folder,
                                   const std::function<void(int done, int frames)>& progress = {});
 
