@@ -325,7 +325,7 @@ class Rectify(RectifyTest):
         (folder / "cut.png").write_bytes((self.street / "image_0/000000.png").read_bytes()[:-2000])
         (folder / "cut.jpg").write_bytes(b"\xff\xd8\xff\xe0" + bytes(200))
         for name, text in (("empty.mp4", ""), ("empty.avi", ""), ("half.txt", f"{raw}/cam0/9.png\n"), ("same.txt", f"{raw}/cam0/9.png {raw}/cam0/9.png\n"),
-                           ("some.txt", "a.png b.png 0.1\nc.png d.png\n")):
+                           ("some.txt", "a.png b.png 0.1\nc.png d.png\n"), ("\udcff.tif", ""), ("\udcff.avi", "")):
             (folder / name).write_text(text)
         others = ("a.pfm", b"Pf\n8 8\n-1\n" + bytes(256), "a map of floats"), ("a.dng", b"II*\0" + bytes(99), "developed to PNG"), ("a.pnm", b"P5\n2 2\n255\nabcd", "name it .pgm")
         for name, content, _ in others:  # which OpenCV would take for videos
@@ -347,6 +347,7 @@ class Rectify(RectifyTest):
             (f"--side-by-side {folder}/pages.tif", "pages.tif: holds 3 pictures"), (f"--side-by-side {folder}/float.tif", "float.tif", "its pixels are float32"),
             (f"--list {folder}/half.txt", "half.txt:1"), (f"--list {folder}/same.txt", "same.txt:1", "is the left and the right image"),
             (f"--list {folder}/some.txt", "has SECONDS in some rows only"),
+            *((f"--side-by-side {folder}/\udcff.{kind}", "its name is no UTF-8") for kind in ("tif", "avi")),
             (f"--left {folder}/8.png --right {folder}/16.png", "8x8 of 8 bits", "8x8 of 16 bits")), ["rectify"], ["--calib", calib, "--out", self.folder / "never"])
         self.assert_all_refused((
             (f"{both} --calib {{street}}/calib.txt --alpha 0.5 --out {{never}}", "--alpha 0.5", "rectified images"), (f"{both} --out {{never}}", "--calib FILE"),

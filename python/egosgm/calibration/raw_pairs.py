@@ -39,13 +39,15 @@ def _refuse(text: str) -> _egosgm.InvalidArgument:
 
 
 def _expect_file(file: str) -> None:
-    """For OpenCV, which would wait for a pipe without an end."""
+    """For OpenCV, which would wait for a pipe without an end, and crash on a name that is no text."""
     if "://" in file:
         raise _refuse(f"{file}: is an address, and nothing here uses the network: in Python, egosgm.run takes pairs, as cv2.VideoCapture gives them")
     if not os.path.exists(file):
         raise _refuse(f"{file}: no such file")
     if not os.path.isfile(file):
         raise _refuse(f"{file}: is no file; give an image or a video")
+    if any("\udc80" <= letter <= "\udcff" for letter in file):
+        raise _refuse(f"{file}: its name is no UTF-8, which OpenCV needs to read it: rename it, or give a link to it")
 
 
 def _read_image(file: pathlib.Path) -> Any:
