@@ -5,6 +5,7 @@ import collections
 import contextlib
 import http.server
 import pathlib
+import shlex
 import sys
 import threading
 import time
@@ -286,5 +287,5 @@ def main(arguments: Sequence[str]) -> int:
             tell(f"\r\x1b[K{state}" if is_terminal else state, end="" if is_terminal else "\n")
     if pairs.note:
         say(pairs.note)
-    tell(f"{counted(shown, 'pair')} matched, {pairs.dropped} dropped" + (f"; egosgm run {given.record} --out OUT" if record and record.frames else ""))
+    tell(f"{counted(shown, 'pair')} matched, {pairs.dropped} dropped" + (f"; egosgm run {shlex.quote(given.record)} --out OUT" if record and record.frames else ""))
     return 0

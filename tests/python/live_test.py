@@ -136,17 +136,17 @@ def test_videos_are_matched_shown_and_recorded(is_one, videos, calib, tmp_path, 
     shown = []
     monkeypatch.setattr(live.Page, "show", lambda page, picture, state: shown.append((picture, state)))
     source = ["--side-by-side", videos[2]] if is_one else videos[:2]
-    words = ["live", *source, "--calib", calib, "--record", str(tmp_path / "record"), "--set", "disparities=48", "--set", "constants.coarse_match.p1=7"]
+    words = ["live", *source, "--calib", calib, "--record", str(tmp_path / "a record"), "--set", "disparities=48", "--set", "constants.coarse_match.p1=7"]
     assert run_tool(words) == 0
     first, *states, last = capsys.readouterr().out.splitlines()
-    assert first.startswith("http://127.0.0.1:") and f"egosgm run {tmp_path}/record" in last
+    assert first.startswith("http://127.0.0.1:") and f"egosgm run '{tmp_path}/a record' --out" in last
     matched, dropped = map(int, re.match(r"(\d+) pairs? matched, (\d+) dropped; ", last).groups())
     assert matched + dropped == FRAMES and states == [state for _, state in shown] and len(shown) == matched
     picture, state = shown[0]
     assert picture.shape == (2 * HEIGHT, WIDTH, 3) and picture[HEIGHT:].any() and "pairs/s" in state and "ms old" in state
-    recorded = egosgm.open_folder(tmp_path / "record")
+    recorded = egosgm.open_folder(tmp_path / "a record")
     assert len(recorded.frames) == matched
-    times = [float(row) for row in (tmp_path / "record/times.txt").read_text().split()]
+    times = [float(row) for row in (tmp_path / "a record/times.txt").read_text().split()]
     assert times == sorted(times) and times[0] >= 0
 
 
