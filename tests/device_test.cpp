@@ -73,7 +73,10 @@ TEST_F(DeviceTest, ListsThemWithWhatTheySayOfThemselves) {
 }
 
 TEST_F(DeviceTest, TakesTheFirstByDefault) {
-  EXPECT_TRUE(is_same(Device::select(), Device::list().front()));
+  Device first = Device::select();
+  EXPECT_TRUE(is_same(first, Device::list().front()));
+  const Device moved = std::move(first);
+  EXPECT_TRUE(is_same(first, moved));  // NOLINT(bugprone-use-after-move): device.h allows it
   set_wanted("");
   EXPECT_TRUE(is_same(Device::select(), Device::list().front()));
 }

@@ -33,10 +33,13 @@ struct DeviceInfo {
   std::vector<std::string> lacks;
 };
 
-/// An OpenCL device. Copies refer to the same one. Thread-safe. In a process that was forked from one that used a
-/// device, all that needs one throws DeviceError: drivers do not survive a fork.
+/// An OpenCL device. Copies refer to the same one, and so does what was moved from. Thread-safe. In a process that was
+/// forked from one that used a device, all that needs one throws DeviceError: drivers do not survive a fork.
 class EGOSGM_EXPORT Device {
  public:
+  Device(const Device&) = default;
+  Device& operator=(const Device&) = default;
+
   /// All devices, in the order of their types; then as the platforms list them.
   static std::vector<Device> list();
 
