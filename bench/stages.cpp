@@ -49,7 +49,8 @@ std::map<std::string, double> bytes_of(shared::ImageSize size, double cells) {
           {"Census", grey + codes},
           {"StepPenalties", grey + 8 * pixels},
           {"BandedSgm", 2 * (2 * (codes + band) + maps + cells)},
-          {"MedianFilter", 4 * maps},
+          {"MedianFilter", 2 * maps},
+          {"WeightedMedian", 4 * maps + grey},
           {"RowInterpolation", 6 * map},
           {"SpeckleRemoval", 2 * map},
           // Both views' codes, prediction and measurement, those of a quarter, and what is given out of the left view.

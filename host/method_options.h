@@ -72,7 +72,7 @@ struct VerticalAlignmentOptions {
   float gain = 0.1f;    // part of what a frame finds that is added to the offsets, once they are known; 0 to 1
 };
 struct MedianFilterOptions {
-  bool enabled = true;  // 3x3 median of the disparities, before the left-right check
+  bool enabled = true;  // medians of the disparities, before the left-right checks
 };
 struct SadCheckOptions {
   float max_difference = 0.0f;  // mean absolute grey difference of the 3x3 windows (8-bit scale); 0: no check

@@ -159,7 +159,9 @@
 // The disparities of RightMap are whole numbers of such steps.
 #define EGOSGM_RIGHT_MAP_STEPS_PER_PX 65536.0f
 
-// MedianFilter fills a hole that has at least so many of its eight neighbours, with this variance.
+// The weight of a WeightedMedian's vote falls by the difference of the grey values from this to none. A hole that at
+// least so many of eight pixels vote for is filled, with this variance.
+#define EGOSGM_VOTE_GREYS 48
 #define EGOSGM_FILL_MIN_COUNT 6
 #define EGOSGM_FILLED_VARIANCE_PX2 1.0f
 

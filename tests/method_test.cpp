@@ -50,7 +50,7 @@ TEST(Method, BuildsWhatItsOptionsNeed) {
   EXPECT_TRUE(Built().has("read_off.cl"));
   const Built paper([](auto& o) { o = MethodOptions(PipelineOptions::paper()); });
   EXPECT_TRUE(paper.has("sad_check.cl"));
-  for (const char* file : {"coarse_match.cl", "median_filter.cl", "vertical_alignment.cl"}) {
+  for (const char* file : {"coarse_match.cl", "median_filter.cl", "vertical_alignment.cl", "weighted_median.cl"}) {
     EXPECT_FALSE(paper.has(file)) << file;
   }
   Built alone([](auto& o) { o.temporal = false; });

@@ -181,11 +181,11 @@ std::vector<Case> cases() {
   // The strip to the left of a board that only the left camera sees.
   all.push_back({"unconfirmed", Reason::kUnconfirmed, 300, {{board(1, -0.3, 0.5, -0.4, 0.4), kWall}, 1}});
   // To the left of a board that moves right in the image as the camera moves left.
-  // With both views tracked, more of what one camera alone sees is right: hardly more than half of it is wrong.
+  // Much of what one camera alone sees is right, more so with both views tracked: hardly more than half of it is wrong.
   const auto track_left = [](PipelineOptions& options) { options.track_right = false; };
   const Scenery uncovered{{board(2, -0.6, 1, -0.8, 0.8), kWall}, 4, -0.08};
   all.push_back({"uncovered", Reason::kUncovered, 100, uncovered, [](PipelineOptions&) {}, 0.5});
-  all.push_back({"uncovered_left_tracked", Reason::kUncovered, 100, uncovered, track_left});
+  all.push_back({"uncovered_left_tracked", Reason::kUncovered, 100, uncovered, track_left, 0.55});
   // A pane begins to show what seems to lie behind it.
   Board pane = board(1.25, -0.5, 0.5, -0.4, 0.4);
   pane.reflects_from = 3, pane.reflected_depth_m = 4;
@@ -208,8 +208,8 @@ std::vector<Case> cases() {
   Board leaving = board(0.8, -0.5, 0.5, -0.4, 0.4);
   leaving.away_a_frame_m = 0.4;
   const Scenery blind{{leaving, kWall}, 3, 0, 0, Rectangle{50, 22, 135, 88}};
-  all.push_back({"predicted", Reason::kPredicted, 400, blind});
   // What the board uncovered while the cameras were blind is missing: nothing is published there without evidence.
+  all.push_back({"predicted", Reason::kPredicted, 400, blind, [](PipelineOptions&) {}, 0.6, 0.21});
   all.push_back({"predicted_left_tracked", Reason::kPredicted, 500, blind, track_left, 0.6, 0.21});
   return all;
 }
@@ -218,7 +218,7 @@ struct Noise {
   int sigma_grey;
   double slack;  // of the bounds, which are those of little noise
 };
-constexpr Noise kNoise[] = {{0, 0.001}, {1, 0.003}, {2, 0.001}, {4, 0.065}};
+constexpr Noise kNoise[] = {{0, 0.001}, {1, 0}, {2, 0.001}, {4, 0.065}};
 
 class ReasonScenes : public ::testing::TestWithParam<std::tuple<Case, Noise>> {};
 

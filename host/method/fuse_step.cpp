@@ -10,7 +10,8 @@ FuseStep::FuseStep(ocl::Context& context, shared::ImageSize size, const MethodOp
       consistency_(context, size) {
   if (Evidence::is_of(options)) evidence_.emplace(context, size, options);
   if (!options.track_right) right_map_.emplace(context, size, range_of(options));
-  if (options.median_filter.enabled) median_filter_.emplace(context, size);
+  if (options.median_filter.enabled)
+    weighted_median_.emplace([&context, size](PixelType type) { return WeightedMedian(context, size, type); });
   if (options.sad_check.max_difference > 0) {
     sad_check_.emplace(
         [&context, size, check = options.sad_check](PixelType type) { return SadCheck(context, size, type, check); });
@@ -18,6 +19,7 @@ FuseStep::FuseStep(ocl::Context& context, shared::ImageSize size, const MethodOp
 }
 
 void FuseStep::prepare(PixelType type) {
+  if (weighted_median_) weighted_median_->prepare(type);
   if (sad_check_) sad_check_->prepare(type);
 }
 
@@ -32,8 +34,11 @@ void FuseStep::update(const Plan& plan, const Matched& matched, const Prediction
   const KalmanUpdate::FrameEvidence of_frame{prediction.evidence, fusion.evidence, plan.repeats, plan.sees_again};
   kalman_update_.update(prediction.hidden, prediction.maps, measured, evidence_ ? &of_frame : nullptr, fused,
                         fusion.doubtful, after.evidence, plan.tracked);
-  if (median_filter_) median_filter_->fill(fusion.fused, fusion.smoothed, belief.variance, plan.tracked);
-  StereoMaps smoothed{median_filter_ ? fusion.smoothed : fusion.fused, belief.variance};
+  if (weighted_median_) {
+    (*weighted_median_)[matched.images.type].filter(matched.images.pixels, fusion.fused, fusion.smoothed,
+                                                    belief.variance, plan.tracked);
+  }
+  StereoMaps smoothed{weighted_median_ ? fusion.smoothed : fusion.fused, belief.variance};
   if (right_map_) {
     right_map_->complete(measured, left_right_px_, smoothed, plan.wanted.has_right(), plan.tracked.row_step);
   }

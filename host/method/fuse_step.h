@@ -6,9 +6,9 @@
 #include "host/stages/consistency_check.h"
 #include "host/stages/evidence.h"
 #include "host/stages/kalman_update.h"
-#include "host/stages/median_filter.h"
 #include "host/stages/right_map.h"
 #include "host/stages/sad_check.h"
+#include "host/stages/weighted_median.h"
 
 namespace egosgm {
 
@@ -53,7 +53,7 @@ class FuseStep {
   const OutsideView outside_;
   std::optional<Evidence> evidence_;
   KalmanUpdate kalman_update_;
-  std::optional<MedianFilter> median_filter_;
+  std::optional<OfEachType<WeightedMedian>> weighted_median_;
   std::optional<RightMap> right_map_;  // where the left view alone is tracked
   ConsistencyCheck consistency_;
   std::optional<OfEachType<SadCheck>> sad_check_;

@@ -4,16 +4,10 @@
 namespace egosgm {
 
 MedianFilter::MedianFilter(ocl::Context& context, shared::ImageSize size, int pixels)
-    : stage_(context, "MedianFilter", "median_filter.cl", size, pixels),
-      filter_(stage_, "filter"),
-      filter_and_fill_(stage_, "filter_and_fill") {}
+    : stage_(context, "MedianFilter", "median_filter.cl", size, pixels), filter_(stage_, "filter") {}
 
 void MedianFilter::filter(const Map& disparity, Map& filtered, Views views) {
   stage_.launch_pixels(filter_, views.count, views.row_step, disparity, filtered);
-}
-
-void MedianFilter::fill(const Map& disparity, Map& filtered, Map& variance, Views views) {
-  stage_.launch_pixels(filter_and_fill_, views.count, views.row_step, disparity, filtered, variance);
 }
 
 }  // namespace egosgm

@@ -8,23 +8,17 @@
 namespace egosgm {
 
 /// Every valid disparity becomes the median of its 3x3 window and keeps its variance. A neighbour outside the image or
-/// without a value votes for the centre.
+/// without a value votes for the centre. A pixel without a disparity stays one.
 class MedianFilter {
  public:
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
   MedianFilter(ocl::Context& context, shared::ImageSize size, int pixels = 0);
 
-  /// A pixel without a disparity stays one.
   void filter(const Map& disparity, Map& filtered, Views views);
-  /// A pixel without a disparity takes the median of its neighbours, with a variance of 1 px^2, if at least six of the
-  /// eight have a value.
-  void fill(const Map& disparity, Map& filtered, Map& variance, Views views);
 
  private:
   ocl::Stage stage_;
   ocl::Kernel<const shared::ImageSize, const cl_int, const ocl::Buffer<float>, ocl::Buffer<float>> filter_;
-  ocl::Kernel<const shared::ImageSize, const cl_int, const ocl::Buffer<float>, ocl::Buffer<float>, ocl::Buffer<float>>
-      filter_and_fill_;
 };
 
 }  // namespace egosgm

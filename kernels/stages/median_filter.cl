@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The median of 3x3 disparities, in both views. A neighbour outside the image or without a value votes for the centre;
-// a centre without a value gets the median (the upper of two middle ones) of its neighbours if at least
-// EGOSGM_FILL_MIN_COUNT of the eight have one. Rows above and below are the next ones that the view has.
-#include "method.h"
+// a centre without a value stays one. Rows above and below are the next ones that the view has.
 #include "pixels.h"
 
 // lint: PIXELS=1
@@ -26,27 +24,16 @@ static inline Sorted sort(const Floats a, const Floats b, const Floats c) {
   return sorted;
 }
 
-// One block, of rows that begin at `here`, `filtered` and `variance`. Without filling, `variance` is not read.
-ALWAYS_INLINE void filter_block(const int x, const int width, const bool fills, const int has_above,
-                                const int has_below, const int stride, global const float* here, global float* filtered,
-                                global float* variance) {
+// One block, of rows that begin at `here` and `filtered`.
+ALWAYS_INLINE void filter_block(const int x, const int width, const int has_above, const int has_below,
+                                const int stride, global const float* here, global float* filtered) {
   // Rows outside the image are read where they are not used.
   global const float* above = has_above ? here - stride : here;
   global const float* below = has_below ? here + stride : here;
   const Floats d = load_pixels(here, x, width);
-  const Floats lowest = -1e30f;
-  const Floats highest = 1e30f;
-  const Ints is_hole = d == INVALID;
-  Ints holes = 0;
-  // Without a centre to vote for, neighbours without a value vote high and low by turns, which leaves the median of
-  // the others.
 #define VOTE(vote, exists, from, column)                                                 \
   const Floats neighbour_##vote = (exists) ? load_pixels(from, column, width) : INVALID; \
-  const Ints absent_##vote = neighbour_##vote == INVALID;                                \
-  const Floats by_turns_##vote = (holes & 1) != 0 ? highest : lowest;                    \
-  const Floats abstained_##vote = (fills ? is_hole : (Ints)(0)) ? by_turns_##vote : d;   \
-  holes += absent_##vote ? (Ints)(1) : (Ints)(0);                                        \
-  const Floats vote = absent_##vote ? abstained_##vote : neighbour_##vote;
+  const Floats vote = neighbour_##vote == INVALID ? d : neighbour_##vote;
   VOTE(left_above, has_above, above, x - 1)
   VOTE(left_beside, 1, here, x - 1)
   VOTE(left_below, has_below, below, x - 1)
@@ -55,53 +42,38 @@ ALWAYS_INLINE void filter_block(const int x, const int width, const bool fills, 
   VOTE(right_above, has_above, above, x + 1)
   VOTE(right_beside, 1, here, x + 1)
   VOTE(right_below, has_below, below, x + 1)
-  const Floats centre_vote = is_hole ? highest : d;
 
   const Sorted left = sort(left_above, left_beside, left_below);
-  const Sorted centre = sort(just_above, centre_vote, just_below);
+  const Sorted centre = sort(just_above, d, just_below);
   const Sorted right = sort(right_above, right_beside, right_below);
   // The median of nine is the median of: the largest of the columns' lowest, the median of their medians, the
   // smallest of their highest.
   const Floats middle =
       median(upper(upper(left.low, centre.low), right.low), median(left.middle, centre.middle, right.middle),
              lower(lower(left.high, centre.high), right.high));
-  if (!fills) {
-    store_pixels(is_hole ? INVALID : middle, filtered, x, width);
-    return;
-  }
-  const Ints is_filled = is_hole & (8 - holes >= EGOSGM_FILL_MIN_COUNT);
-  store_pixels((is_hole != is_filled) ? INVALID : middle, filtered, x, width);
-  const Floats kept_variance = load_pixels(variance, x, width);
-  store_pixels(is_filled ? (Floats)(EGOSGM_FILLED_VARIANCE_PX2) : kept_variance, variance, x, width);
+  store_pixels(d == INVALID ? INVALID : middle, filtered, x, width);
 }
 
-AT_EDGE void filter_block_at_edge(const int x, const bool fills, const int has_above, const int has_below,
-                                  const int width, const int stride, global const float* here, global float* filtered,
-                                  global float* variance) {
-  filter_block(x, width, fills, has_above, has_below, stride, here, filtered, variance);
+AT_EDGE void filter_block_at_edge(const int x, const int has_above, const int has_below, const int width,
+                                  const int stride, global const float* here, global float* filtered) {
+  filter_block(x, width, has_above, has_below, stride, here, filtered);
 }
 
-COMPILED_ONCE void filter_row(const WorkItem at, const bool fills, const ImageSize size, const int row_step,
-                              global const float* disparity, global float* filtered, global float* variance) {
+COMPILED_ONCE void filter_row(const WorkItem at, const ImageSize size, const int row_step,
+                              global const float* disparity, global float* filtered) {
   if (!has_row(at, row_step)) return;
   const int stride = row_step * size.width;
   const int width = size.width, has_above = at.y >= row_step, has_below = at.y + row_step < size.height;
   const size_t row = ((size_t)at.view * size.height + at.y) * width;
   FOR_PIXELS(x, width) {
     if (has_above && has_below && is_within(x, 1, width)) {
-      filter_block(x, EVERYWHERE, fills, 1, 1, stride, disparity + row, filtered + row, variance + row);
+      filter_block(x, EVERYWHERE, 1, 1, stride, disparity + row, filtered + row);
     } else {
-      filter_block_at_edge(x, fills, has_above, has_below, width, stride, disparity + row, filtered + row,
-                           variance + row);
+      filter_block_at_edge(x, has_above, has_below, width, stride, disparity + row, filtered + row);
     }
   }
 }
 
 KERNEL void filter(const ImageSize size, const int row_step, global const float* disparity, global float* filtered) {
-  filter_row(THIS_WORK_ITEM, false, size, row_step, disparity, filtered, 0);
-}
-
-KERNEL void filter_and_fill(const ImageSize size, const int row_step, global const float* disparity,
-                            global float* filtered, global float* variance) {
-  filter_row(THIS_WORK_ITEM, true, size, row_step, disparity, filtered, variance);
+  filter_row(THIS_WORK_ITEM, size, row_step, disparity, filtered);
 }

@@ -5,31 +5,12 @@
 //
 // Four bytes a pixel: the steps to the left, to above, to the upper left and to the upper right neighbour. They lie
 // side by side, as what a sweep reads in the short rows of a tile should lie in few places.
-#include "grey.h"
-#include "pixels.h"
+#include "grey_at.h"
 
 // lint: PIXEL_BYTES=1 PIXELS=1
 // lint: PIXEL_BYTES=1 PIXELS=16
 // lint: PIXEL_BYTES=2 PIXELS=1
 // lint: PIXEL_BYTES=2 PIXELS=16
-
-#if PIXELS > 1
-AT_EDGE Ints grey_at_edge(global const Pixel* row, const int x, const int width) {
-  const Ints inside = clamp(x + LANE_INDICES, (Ints)(0), (Ints)(width - 1));
-  const Pixels pixels = GATHERED(Pixels, row, inside);
-  return convert_int16(to_8_bit(pixels));
-}
-#endif
-
-// Grey values of pixels x .. x + PIXELS - 1; outside the row its border's.
-static inline Ints grey_at(global const Pixel* row, const int x, const int width) {
-#if PIXELS == 1
-  return to_8_bit(row[clamp(x, 0, width - 1)]);
-#else
-  if (x >= 0 && x + PIXELS <= width) return convert_int16(to_8_bit(load_grey(row + x)));
-  return grey_at_edge(row, x, width);
-#endif
-}
 
 static inline Ints penalty(const Ints most, const Ints least, const Ints slope, const Ints p, const Ints q) {
   return max(most - slope * max(p - q, q - p), least);

@@ -3,14 +3,13 @@
 
 #include <algorithm>
 
-#include "tests/reference/method.h"
 #include "tests/reference/present_rows.h"
 
 namespace egosgm::reference {
 
 namespace {
 
-testing::HostMaps filter(shared::ImageSize size, bool fill, const testing::HostMaps& in) {
+testing::HostMaps filter(shared::ImageSize size, const testing::HostMaps& in) {
   testing::HostMaps out = in;
   const std::size_t pixels = static_cast<std::size_t>(size.width) * size.height;
   for (std::size_t view = 0; view < 2; ++view) {
@@ -18,19 +17,17 @@ testing::HostMaps filter(shared::ImageSize size, bool fill, const testing::HostM
       for (int x = 0; x < size.width; ++x) {
         const auto at = [&](int u, int v) { return view * pixels + static_cast<std::size_t>(v) * size.width + u; };
         const float centre = in.disparity[at(x, y)];
-        const bool is_hole = centre == EGOSGM_INVALID_DISPARITY;
+        if (centre == EGOSGM_INVALID_DISPARITY) continue;
         std::vector<float> votes;
         for (int v = y - 1; v <= y + 1; ++v) {
           for (int u = x - 1; u <= x + 1; ++u) {
             const bool inside = u >= 0 && u < size.width && v >= 0 && v < size.height;
             const bool counts = inside && in.disparity[at(u, v)] != EGOSGM_INVALID_DISPARITY;
-            if (counts || !is_hole) votes.push_back(counts ? in.disparity[at(u, v)] : centre);
+            votes.push_back(counts ? in.disparity[at(u, v)] : centre);
           }
         }
         std::sort(votes.begin(), votes.end());
-        if (is_hole && (!fill || votes.size() < 6)) continue;
         out.disparity[at(x, y)] = votes[votes.size() / 2];
-        if (is_hole) out.variance[at(x, y)] = kFilledVariancePx2;
       }
     }
   }
@@ -39,9 +36,9 @@ testing::HostMaps filter(shared::ImageSize size, bool fill, const testing::HostM
 
 }  // namespace
 
-testing::HostMaps median_filter(shared::ImageSize size, bool fill, const testing::HostMaps& in, cl_int row_step) {
+testing::HostMaps median_filter(shared::ImageSize size, const testing::HostMaps& in, cl_int row_step) {
   return of_present_rows(size, row_step, in,
-                         [&](shared::ImageSize of, const testing::HostMaps& maps) { return filter(of, fill, maps); });
+                         [&](shared::ImageSize of, const testing::HostMaps& maps) { return filter(of, maps); });
 }
 
 }  // namespace egosgm::reference

@@ -6,6 +6,6 @@
 
 namespace egosgm::reference {
 
-testing::HostMaps median_filter(shared::ImageSize size, bool fill, const testing::HostMaps& in, cl_int row_step = 1);
+testing::HostMaps median_filter(shared::ImageSize size, const testing::HostMaps& in, cl_int row_step = 1);
 
 }  // namespace egosgm::reference

@@ -41,6 +41,7 @@ inline constexpr int kDynamicShare = 3;
 inline constexpr int kDynamicVotes = 6;
 inline constexpr float kDoubtfulVariancePx2 = 16.0f;
 inline constexpr float kFilledVariancePx2 = 1.0f;
+inline constexpr std::size_t kFillMinCount = 6;
 inline constexpr int kJumpDistance = 2;
 inline constexpr float kLeastChange = 2.0f;
 inline constexpr int kLeastRepeatPx = 4;
@@ -59,5 +60,6 @@ inline constexpr float kUncoveredJumpPx = 3.0f;
 inline constexpr int kUncoveredRadius = 8;
 inline constexpr int kVarianceRadius = 8;
 inline constexpr int kVarianceStep = 4;
+inline constexpr int kVoteGreys = 48;
 
 }  // namespace egosgm::reference

@@ -26,6 +26,7 @@
 #include "tests/reference/sad_check.h"
 #include "tests/reference/speckle_removal.h"
 #include "tests/reference/step_penalties.h"
+#include "tests/reference/weighted_median.h"
 
 namespace egosgm::reference {
 namespace {
@@ -193,10 +194,10 @@ Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOff
   pass.codes = padded_codes(size_, both[0], both[1], code_padding_, sgm.cost);
   const std::vector<std::uint16_t> values(pass.images.begin(), pass.images.end());
   pass.penalties = step_penalties(size_, values, images.bits, sgm, step);
-  std::vector<std::uint16_t> grey = values;
-  for (std::uint16_t& value : grey) value = static_cast<std::uint16_t>(value >> (images.bits - 8));
-  pass.matched = banded_sgm(size_, range_, sgm, both, grey, pass.band.bands, reads_off, step);
-  pass.smoothed = options_.median_filter.enabled ? median_filter(size_, false, pass.matched, step) : pass.matched;
+  pass.greys = values;
+  for (std::uint16_t& value : pass.greys) value = static_cast<std::uint16_t>(value >> (images.bits - 8));
+  pass.matched = banded_sgm(size_, range_, sgm, both, pass.greys, pass.band.bands, reads_off, step);
+  pass.smoothed = options_.median_filter.enabled ? median_filter(size_, pass.matched, step) : pass.matched;
   const ConsistencyCheckOptions& check = options_.consistency;
   pass.consistent =
       consistency_check(size_, reads_off ? check.read_off_px : check.measurement_px, false, pass.smoothed, step);
@@ -233,7 +234,8 @@ void Pipeline::update(const Images& images, bool stands, Frame& frame) const {
   const int step = frame.row_step;
   frame.fused = kalman_update(size_, options_.kalman_update, predicted, pass.measured, evidence ? &*evidence : nullptr);
   frame.fused = without_absent_rows(size_, step, frame.fused);
-  frame.fused_smoothed = options_.median_filter.enabled ? median_filter(size_, true, frame.fused, step) : frame.fused;
+  frame.fused_smoothed =
+      options_.median_filter.enabled ? weighted_median(size_, pass.greys, frame.fused, step) : frame.fused;
   if (!options_.track_right) {
     frame.fused_smoothed =
         right_map(size_, range_.min, options_.consistency.update_px, pass.measured, frame.fused_smoothed);

@@ -31,7 +31,8 @@ struct ViewMotions {
 /// A matching pass: of the resampled images, in their bands, and what each stage left of it.
 struct Pass {
   std::vector<int> images;
-  std::vector<float> coarse;  // disparities of both views at a quarter of the resolution
+  std::vector<std::uint16_t> greys;  // of 8 bits
+  std::vector<float> coarse;         // disparities of both views at a quarter of the resolution
   ViewCodes view_codes, coarse_codes, coarse_alike;
   SearchBands band;
   std::vector<std::uint32_t> codes;     // as kernels/stages/census.cl lays them out

@@ -13,20 +13,13 @@ namespace {
 
 using testing::kNone;
 
-/// What becomes of a pixel without a disparity.
-enum class Holes { kLeave, kFill };
-
-testing::HostMaps filter(shared::ImageSize size, const testing::HostMaps& in, Holes holes = Holes::kLeave,
-                         int pixels = 0, Views views = Views::kBoth) {
+testing::HostMaps filter(shared::ImageSize size, const testing::HostMaps& in, int pixels = 0,
+                         Views views = Views::kBoth) {
   ocl::Context context(testing::any_device());
   MedianFilter stage(context, size, pixels);
   StereoMaps maps = testing::upload(context, size, in);
   Map filtered = testing::upload(context, size, testing::earlier_maps(size)).disparity;
-  if (holes == Holes::kFill) {
-    stage.fill(maps.disparity, filtered, maps.variance, views);
-  } else {
-    stage.filter(maps.disparity, filtered, views);
-  }
+  stage.filter(maps.disparity, filtered, views);
   return testing::masked({filtered.read(context), maps.variance.read(context)});
 }
 
@@ -51,12 +44,10 @@ TEST_P(MedianFilterTest, EqualsReference) {
     const testing::HostMaps maps = testing::random_maps(size, -40, 90, holes, 7);
     const testing::HostMaps before = testing::masked(
         {testing::earlier_maps(size).disparity, testing::upload(context, size, maps).variance.read(context)});
-    for (const Holes policy : {Holes::kLeave, Holes::kFill}) {
-      SCOPED_TRACE(holes);
-      testing::expect_reference(
-          size, before, [&](int pixels, Views views) { return filter(size, maps, policy, pixels, views); },
-          [&](int step) { return reference::median_filter(size, policy == Holes::kFill, maps, step); });
-    }
+    SCOPED_TRACE(holes);
+    testing::expect_reference(
+        size, before, [&](int pixels, Views views) { return filter(size, maps, pixels, views); },
+        [&](int step) { return reference::median_filter(size, maps, step); });
   }
 }
 
@@ -74,20 +65,6 @@ TEST(MedianFilter, LeavesHolesAndLetsThemVoteForTheCentre) {
   EXPECT_EQ(filter_left({3, 3}, {1, 1, 1, 1, 5, kNone, kNone, kNone, kNone})[4], 5);
   EXPECT_EQ(filter_left({3, 3}, {1, 1, 1, 1, 5, 1, kNone, kNone, kNone})[4], 1);
   EXPECT_EQ(filter_left({3, 3}, {1, 1, 1, 1, kNone, 1, 1, 1, 1})[4], kNone);
-}
-
-TEST(MedianFilter, FillsAHoleThatSixNeighboursSurround) {
-  const auto centre = [](const std::vector<float>& left) {
-    testing::HostMaps maps{left, std::vector<float>(18, 0.25f)};
-    maps.disparity.insert(maps.disparity.end(), left.begin(), left.end());
-    const testing::HostMaps filled = filter({3, 3}, maps, Holes::kFill);
-    EXPECT_EQ(filled.variance[4], filled.disparity[4] == kNone ? 0.0f : 1.0f);
-    return filled.disparity[4];
-  };
-  EXPECT_EQ(centre({1, 2, 3, 4, kNone, 5, 6, 7, 8}), 5);
-  EXPECT_EQ(centre({1, kNone, 3, 4, kNone, 5, 6, 7, 8}), 5);
-  EXPECT_EQ(centre({1, kNone, 3, 4, kNone, 5, 6, kNone, 8}), 5);
-  EXPECT_EQ(centre({1, kNone, kNone, 4, kNone, 5, 6, kNone, 8}), kNone);
 }
 
 TEST(MedianFilter, TheBorderVotesForTheCentre) {
