@@ -16,7 +16,7 @@ except ImportError:
     sys.exit("no moving pictures without Pillow: apt install python3-pil")
 
 FRAME_MS = 200
-MOST_SIDE = 1280  # of a moving picture [px]
+MOST_WIDTH, MOST_HEIGHT = 1280, 720  # of a moving picture [px]
 
 
 def labelled(picture, text, size):
@@ -33,17 +33,20 @@ def labelled(picture, text, size):
 def main(sequence, left, right, out):
     frames = []
     for file in sorted((left / "color").glob("*.png")):
-        image = next(sequence / folder / file.name for folder in ("image_0", "image_2", "left") if (sequence / folder / file.name).exists())
-        pictures = [Image.open(shown).convert("RGB") for shown in (image, *(run / "color" / file.name for run in (left, right)))]
+        shown = (sequence / "image_0", sequence / "image_2", sequence / "left", right / "left")
+        image = next((folder / file.name for folder in shown if (folder / file.name).exists()), None)
+        if not image:
+            sys.exit(f"{sequence}: no left image {file.name}: make RIGHT_RUN with --write color,left")
+        pictures = [Image.open(path).convert("RGB") for path in (image, *(run / "color" / file.name for run in (left, right)))]
         width, height = pictures[0].size
         columns, rows = (1, 3) if width >= 2 * height else (3, 1)
-        scale = min(1, MOST_SIDE / (columns * width))
+        scale = min(1, MOST_WIDTH / (columns * width), MOST_HEIGHT / (rows * height))
         width, height = int(scale * width), int(scale * height)
-        shown = Image.new("RGB", (columns * width, rows * height))
+        sheet = Image.new("RGB", (columns * width, rows * height))
         for i, (picture, name) in enumerate(zip(pictures, ("left image", left.name, right.name))):
             picture = labelled(picture.resize((width, height), Image.LANCZOS), name.replace("_", " "), max(12, height // 16))
-            shown.paste(picture, (i % columns * width, i // columns * height))
-        frames.append(shown)
+            sheet.paste(picture, (i % columns * width, i // columns * height))
+        frames.append(sheet)
     if not frames:
         sys.exit(f"{left / 'color'}: no pictures: run with --write color")
     frames[0].save(out, save_all=True, append_images=frames[1:], duration=FRAME_MS, loop=0, quality=50, method=6)

@@ -15,8 +15,9 @@ class WeightedMedian {
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
   WeightedMedian(ocl::Context& context, shared::ImageSize size, PixelType type, int pixels = 0);
 
-  /// A pixel without a disparity takes the median of the others, with a variance of 1 px^2, if at least six of the eight
-  /// have a value and are about as bright. `images`: the pixels of both views without padding, the left view first.
+  /// A pixel without a disparity takes the median of the others, with a variance of 1 px^2, if at least six of the
+  /// eight have a value and are about as bright. `images`: the pixels of both views without padding, the left view
+  /// first.
   void filter(const ocl::Buffer<cl_uchar>& images, const Map& disparity, Map& filtered, Map& variance, Views views);
 
  private:

@@ -31,7 +31,7 @@ COMPILED_ONCE void weigh_row(const WorkItem at, const ImageSize size, const int 
       const int column = x + columns[i], y = at.y + rows[i], is_inside = y >= 0 && y < size.height;
       const long other = is_inside ? (long)rows[i] * width : 0;
       const Ints difference = grey - grey_at(greys + other, column, width);
-      const Ints alike = max((Ints)(EGOSGM_VOTE_GREYS) - max(difference, -difference), (Ints)(0));
+      const Ints alike = max((Ints)(EGOSGM_VOTE_GREYS)-max(difference, -difference), (Ints)(0));
       votes[i] = load_pixels(disparity + row + other, column, width);
       weights[i] = sums[i] = is_valid(votes[i]) ? (is_inside ? alike : (Ints)(0)) : (Ints)(0);
       total += weights[i];

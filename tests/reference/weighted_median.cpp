@@ -12,7 +12,7 @@ namespace egosgm::reference {
 
 testing::HostMaps weighted_median(shared::ImageSize size, const std::vector<std::uint16_t>& greys,
                                   const testing::HostMaps& in, cl_int row_step) {
-  static constexpr std::pair<int, int> kCircle[] = {{0, 0},  {0, -4}, {-3, -2}, {3, -2}, {-4, 0},
+  static constexpr std::pair<int, int> kCircle[] = {{0, 0}, {0, -4}, {-3, -2}, {3, -2}, {-4, 0},
                                                     {4, 0}, {-3, 2}, {3, 2},   {0, 4}};
   testing::HostMaps out = without_absent_rows(size, row_step, in);
   for (int row = 0; row < 2 * size.height; ++row) {
