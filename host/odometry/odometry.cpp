@@ -30,7 +30,6 @@ constexpr int kRoughCell_px = 80, kRoughPerCell = 8;  // few strong features fin
 constexpr SearchWindow kPriorWindow{40, 24};
 constexpr SearchWindow kGuidedWindow{5, 4};
 constexpr double kRoughThreshold_px = 2.5;
-constexpr double kSureRatio = 0.7;  // inliers among all matches, where few features had too few of them
 // Standing still: no more than this, and no more than noise explains (99.9 % of six degrees of freedom).
 constexpr double kStandstill_m = 0.01, kStandstill_rad = 1e-3, kStandstillChi2 = 22.5;
 
@@ -138,7 +137,7 @@ MotionEstimate StereoOdometry::State::rough_motion(const std::optional<Eigen::Is
   const int disparity = max_disparity_px(current.left.width);
   // Wide windows let in more false matches; whether the motion holds is seen on the refined ones.
   StereoOdometryOptions lenient = options;
-  lenient.min_inlier_ratio *= 0.5;
+  lenient.min_inlier_ratio *= 0.25;
   lenient.min_inliers = std::max(6, options.min_inliers / 2);
   const auto attempt = [&](const Eigen::Isometry3d* motion, const SearchWindow& window) {
     const auto matches = match_circle(calibration, previous, current, queries, motion, window, disparity);
@@ -182,12 +181,6 @@ void StereoOdometry::State::estimate(const std::optional<Eigen::Isometry3d>& pri
   result.inliers = static_cast<int>(fine.inliers.size());
   result.reprojection_rms_px = fine.rms_px;
   result.reason = fine.reason;
-  const int rough_inliers = static_cast<int>(rough.inliers.size());
-  if (fine.reason.empty() && rough_inliers < options.min_inliers && result.inliers < kSureRatio * result.matches) {
-    result.reason = "too few inliers: " + std::to_string(rough_inliers) + " of at least " +
-                    std::to_string(options.min_inliers) + " among few features, and no more than " +
-                    std::to_string(result.inliers) + " of " + std::to_string(result.matches) + " among all";
-  }
   keep_tracks(refined, fine.inliers);
   if (!result.reason.empty()) return;
   result.motion = fine.motion;

@@ -134,6 +134,13 @@ TEST(OdometryMotion, SaysWhyThereIsNone) {
     unrelated.push_back({first.u1, first.v1, first.d1, second.u2, second.v2, second.d2});
   }
   EXPECT_NE(estimate(calibration, unrelated).reason, "");
+
+  // Far points agree with the motion that they are taken for; all near ones contradict it.
+  auto halves = random_matches(generator, calibration, make_motion(0, 0, -1, 0), 240, 0);
+  const auto near = random_matches(generator, calibration, make_motion(0, 0, -6, 0), 200, 0);
+  halves.insert(halves.end(), near.begin(), near.end());
+  const auto half = odometry::refine_motion(calibration, {}, {}, halves, make_motion(0, 0, -1, 0));
+  EXPECT_EQ(half.reason.find("inlier ratio 0.5"), 0u) << half.reason;
 }
 
 // A projector's dots stay where they are in the images, and only their disparities tell that the camera came nearer.
