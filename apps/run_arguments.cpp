@@ -153,7 +153,10 @@ SequenceJob RunArguments::job(const Package& package) const {
     if (!why.empty()) package.take_over(why);
   }
   job.source = source_of(*this, package);
-  job.input = bag.bag.empty() ? input.text() : bag.text();
+  SequenceArguments looked_at = input;
+  if (!bag.bag.empty() || input.videos()) looked_at.frames = "";  // `doctor` takes no frames of them
+  job.input = bag.bag.empty() ? looked_at.text() : bag.text();
+  if (!bag.bag.empty() && !input.calib.empty()) job.input += " " + looked_at.text();
   job.poses_file = poses;
   job.odometry = odometry;
   expect_takeable(*this, job);

@@ -2,6 +2,7 @@
 """egosgm run of videos: the maps are those of the sequence that egosgm rectify makes of them. run() and egosgm doctor read the same."""
 import json
 import pathlib
+import shlex
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ def told(capfd):
     def run(*words, code=0):
         assert run_tool([str(word) for word in words]) == code
         said = capfd.readouterr()
-        return said.err if code else said.out
+        return code and said.err or said.out
     return run
 
 
@@ -66,6 +67,26 @@ def test_a_video_of_one_camera_is_refused_with_the_command_that_reads_it(videos,
 def test_a_video_is_one_input(videos, calib, tmp_path, told):
     for more, named in ((["--left", "x.png"], "--left x.png"), (["--odometry", "x"], "--odometry x"), (["--bag", "x.mcap"], "x.mcap")):
         assert "more than one input" in (said := told("run", videos[2], *more, "--out", tmp_path / "out", code=2)) and named in said
+
+
+def test_two_videos_of_other_rates_are_told_of(videos, calib, tmp_path, told):
+    assert "images a second" not in told("run", *videos[:2], "--out", tmp_path / "out", *SET)
+    faster = str(tmp_path / "faster.avi")
+    writer = cv2.VideoWriter(faster, cv2.VideoWriter_fourcc(*"FFV1"), 8, (WIDTH, HEIGHT))
+    video = cv2.VideoCapture(videos[1])
+    for _ in range(FRAMES):
+        writer.write(video.read()[1])
+    writer.release()
+    named = f"left.avi says that it has 4 images a second, {faster} 8: if so, pairs are of other moments"
+    assert named in told("run", videos[0], faster, "--out", tmp_path / "other", *SET)
+    assert named in told("rectify", "--left", videos[0], "--right", faster, "--calib", calib, "--out", tmp_path / "sequence")
+    assert named in next(finding["text"] for finding in json.loads(told("doctor", videos[0], faster, "--json", code=2)) if finding["verdict"] == "problem")
+
+
+def test_the_command_that_a_warning_names_works(videos, calib, tmp_path, told):
+    said = told("run", *videos[:2], "--calib", calib, "--frames", ":1", "--set", "disparities=16", "--out", tmp_path / "out")
+    command = said[said.index("`egosgm doctor "):].split("`")[1]
+    assert "--calib" in command and "range" in told(*shlex.split(command)[1:], "--disparities", "16", code=2)
 
 
 def test_images_beyond_the_count_are_left_out_and_told(videos):

@@ -24,6 +24,7 @@ _MOST_SKEW_NS = 2_000_000  # of cameras that are triggered together
 _MOST_LIST_BYTES = 1 << 28
 _MOST_PICTURE_BYTES = 1 << 28
 _MOST_HEIGHT = 2  # of a view, in its widths
+_MOST_OTHER_RATE = 1.02  # of the rates of two cameras, which some videos only estimate
 _LEAST_OF_VIDEO = 0.9  # of the images that it says it has, which many videos only estimate
 
 
@@ -97,6 +98,7 @@ class _Source:
 
     note = ""
     count: Optional[int] = None
+    rate_hz = 0.0  # of a video that says it
 
     def grab(self) -> None:
         """Of a camera, takes the next image, which is decoded later: the other camera's is taken before."""
@@ -142,6 +144,7 @@ class _Video(_Source):
                                          "neither an image nor a video that OpenCV can read"))
         count = int(self._video.get(cv2.CAP_PROP_FRAME_COUNT))
         self.count = count if count >= 0 else None
+        self.rate_hz = self._video.get(cv2.CAP_PROP_FPS)
 
     def __iter__(self) -> Iterator[Tuple[Any, Optional[float]]]:
         number = 0
@@ -228,6 +231,10 @@ class _TwoSources(RawPairs):
         if None not in counts and counts[0] != counts[1]:
             raise _refuse(f"--left {left} has {counts[0]} images, --right {right} has {counts[1]}: give as many of both, cut where they show other moments; `ffmpeg -i VIDEO -frames:v N -c:v ffv1 VIDEO.mkv` keeps the first N")
         self.count = counts[0]
+        rates = [source.rate_hz for source in self._sources]
+        if min(rates) > 0 and max(rates) > _MOST_OTHER_RATE * min(rates):
+            self.note = (f"{left} says that it has {rates[0]:g} images a second, {right} {rates[1]:g}: if so, pairs are of other moments; "
+                         f"`ffmpeg -i VIDEO -vf fps={min(rates):g} -c:v ffv1 VIDEO.mkv` makes one of another rate")
 
     def __iter__(self) -> Iterator[RawPair]:
         images_of, pairs = [iter(source) for source in self._sources], 0
@@ -239,7 +246,7 @@ class _TwoSources(RawPairs):
                 break
             yield _same_size(RawPair(left[0], right[0], left[1]), self._names[0][7:])
             pairs += 1
-        notes = [source.note for source in self._sources if source.note]
+        notes = [note for note in (self.note, *(source.note for source in self._sources)) if note]
         if left is not None or right is not None:
             ended, longer = self._names if left is None else self._names[::-1]
             notes.append(f"{ended} ends after {counted(pairs, 'image')}, before {longer}: the rest of that one is left out")
