@@ -72,7 +72,7 @@ struct VerticalAlignmentOptions {
   float gain = 0.1f;    // part of what a frame finds that is added to the offsets, once they are known; 0 to 1
 };
 struct MedianFilterOptions {
-  bool enabled = true;  // medians of the disparities, before the left-right checks
+  bool enabled = true;  // of the measurement, before the left-right checks, and the weighted one of the fused map
 };
 struct SadCheckOptions {
   float max_difference = 0.0f;  // mean absolute grey difference of the 3x3 windows (8-bit scale); 0: no check
