@@ -44,11 +44,16 @@ struct SearchWindow {
   double x_px, y_px;  // farthest from the predicted place
 };
 
+struct DisparityRange {
+  int least, most;  // [px], inclusive
+};
+
 /// The right feature that best matches left feature `i`, and whose best match `i` is.
-int stereo_match(TrackedFrame& frame, int i, int max_disparity_px);
+int stereo_match(TrackedFrame& frame, int i, const DisparityRange& range);
 
 /// Closes the circle for each of the previous frame's left features in `queries`. With `motion`, the search is
-/// around the place where it takes a static point; without, around the last place.
+/// around the place where it takes a static point; without, around the last place. Stereo matches lie at most
+/// `max_disparity_px` from infinity, whose disparity is -doffs_px.
 std::vector<CircularMatch> match_circle(const Calibration& calibration, TrackedFrame& previous, TrackedFrame& current,
                                         const std::vector<int>& queries, const Eigen::Isometry3d* motion,
                                         const SearchWindow& window, int max_disparity_px);

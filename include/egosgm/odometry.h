@@ -21,7 +21,7 @@ struct EGOSGM_EXPORT StereoOdometryOptions {
   // Features.
   int corner_threshold = 40;    // least response of the 5x5 corner and blob filters, 8-bit grey values
   int max_features = 2400;      // strongest that are kept in the left image, spread over buckets
-  double max_disparity_px = 0;  // widest stereo search; 0: a fifth of the image's width
+  double max_disparity_px = 0;  // widest stereo search, from infinity on; 0: a fifth of the image's width
   double max_flow_x_px = 180;   // widest search in time without a prior
   double max_flow_y_px = 90;
 

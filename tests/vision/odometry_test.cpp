@@ -152,8 +152,8 @@ TEST(StereoOdometry, FollowsFastMotionAndIsNotLedByALargeVehicle) {
 }
 
 // `image` drawn lower by `rows` [px].
-Image lowered(const Image& image, double rows) {
-  const cv::Mat shift = (cv::Mat_<double>(2, 3) << 1, 0, 0, 0, 1, rows);
+Image shifted(const Image& image, double columns, double rows) {
+  const cv::Mat shift = (cv::Mat_<double>(2, 3) << 1, 0, columns, 0, 1, rows);
   cv::Mat out;
   cv::warpAffine(mat_of(image), out, shift, {image.cols, image.rows}, cv::INTER_CUBIC, cv::BORDER_REPLICATE);
   return image_of(out);
@@ -163,8 +163,25 @@ TEST(StereoOdometry, BearsAVerticalOffsetBetweenTheImages) {
   const RenderedVideo& drive = turning_drive();
   for (const double rows : {0.5, -0.5, 1.5}) {
     std::vector<SyntheticFrame> frames(drive.frames.begin(), drive.frames.begin() + 5);
-    for (SyntheticFrame& frame : frames) frame.right = lowered(frame.right, rows);
+    for (SyntheticFrame& frame : frames) frame.right = shifted(frame.right, 0, rows);
     expect_all_motions(drive.sequence, frames, {0.01, 0.05}, std::to_string(rows) + " rows, ");
+  }
+}
+
+// Cameras that converge see infinity at -doffs_px.
+TEST(StereoOdometry, MatchesFromInfinityOn) {
+  const RenderedVideo& drive = turning_drive();
+  for (const double doffs_px : {40, -40}) {
+    Calibration calibration = drive.sequence.calibration();
+    calibration.doffs_px = doffs_px;
+    StereoOdometry odometry(calibration);
+    for (int k = 0; k < 5; ++k) {
+      const SyntheticFrame& frame = drive.frames[k];
+      const OdometryResult result = process(odometry, frame.left, shifted(frame.right, doffs_px, 0));
+      if (k == 0) continue;
+      expect_motion(result, drive.sequence.motion(k).current_from_previous, {0.01, 0.05},
+                    "doffs " + std::to_string(doffs_px) + ", frame " + std::to_string(k));
+    }
   }
 }
 
