@@ -22,11 +22,11 @@ class PixelMotion {
   PixelMotion(const Calibration& c, const Eigen::Isometry3d& motion) {
     Eigen::Matrix4d to_space, to_pixels;       // homogeneous points over their depth
     to_space << 1 / c.fx, 0, 0, -c.cx / c.fx,  //
-        0, 1 / c.fx, 0, -c.cy / c.fx,          //
+        0, 1 / c.fy, 0, -c.cy / c.fy,          //
         0, 0, 0, 1,                            //
         0, 0, 1 / (c.fx * c.baseline_m), c.doffs_px / (c.fx * c.baseline_m);
     to_pixels << c.fx, 0, c.cx, 0,               //
-        0, c.fx, c.cy, 0,                        //
+        0, c.fy, c.cy, 0,                        //
         0, 0, -c.doffs_px, c.fx * c.baseline_m,  //
         0, 0, 1, 0;
     matrix_ = to_pixels * motion.matrix() * to_space;

@@ -12,6 +12,7 @@
 
 #include "egosgm/error.h"
 #include "egosgm/vision/synthetic.h"
+#include "host/odometry/geometry.h"
 #include "tests/vision/images.h"
 #include "vision/pixel_motion.h"
 #include "vision/window_sums.h"
@@ -290,6 +291,15 @@ TEST(MovingObjects, RefusalsLeaveTheState) {
         << i;
   }
   EXPECT_TRUE(found_at(process(tracker, kFirst + 1), largest(kFirst + 1)));
+}
+
+TEST(MovingObjects, PixelsMoveAsTheirPointsDo) {
+  const Calibration oblong{.fx = 400, .fy = 700, .cx = 240, .cy = 90, .baseline_m = 0.5, .doffs_px = 7};
+  const Eigen::Isometry3d motion(Eigen::Translation3d(0.3, -0.1, -0.8) *
+                                 Eigen::AngleAxisd(0.05, Eigen::Vector3d(1, 2, 3).normalized()));
+  const auto there = PixelMotion(oblong, motion)(20, 170, 12);
+  ASSERT_TRUE(there);
+  EXPECT_TRUE(there->isApprox(odometry::project(oblong, motion * odometry::triangulate(oblong, 20, 170, 12)), 1e-9));
 }
 
 TEST(MovingObjects, RowsOfPixelsMoveAsEachPixelDoes) {
