@@ -295,6 +295,16 @@ def changed(map_, row, column, height, width, value):
     return copy
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("hole", [np.inf, np.nan])
+def test_holes_of_any_value_are_holes(hole):
+    estimates, truths, moving, world_from_camera = noisy_video()
+    given = dict(moving=moving, calibration=CAMERA, world_from_camera=world_from_camera)
+    expected = egosgm.evaluate_video(estimates, truths, against=truths, **given)
+    with_hole = [[np.where(d == NO, np.float32(hole), d) for d in each] for each in (estimates, truths)]
+    assert str(egosgm.evaluate_video(*with_hole, against=with_hole[1], **given)) == str(expected)
+
+
 def test_what_moves_or_is_hidden_is_not_along_the_motion():
     moving = [np.zeros((HEIGHT, WIDTH), bool) for _ in range(2)]
     moving[0][0, :4] = True

@@ -404,7 +404,7 @@ def map_of(item: Any, name: str) -> np.ndarray:
     array = np.asarray(item, np.float32)
     if array.ndim != 2 or not array.size:
         raise _egosgm.InvalidArgument(f"{name}: an array of shape {array.shape}: give H x W arrays")
-    return array
+    return np.where(np.isfinite(array), array, np.float32(np.nan))
 
 
 def flow_of(item: Any, name: str) -> np.ndarray:
