@@ -16,6 +16,7 @@ namespace egosgm::vision {
 namespace {
 
 constexpr double kClippedShare = 0.01;  // of the points
+constexpr int kBeyond_px = 2;           // noise of what lies where the range begins
 constexpr int kLeastSlope = 24;         // of grey levels; where rows are smoother, nothing is sure
 constexpr int kCoarseSide = 256;        // images are made smaller, down to this
 constexpr double kFewest = 0.03;        // of the pixels; below, the map says nothing
@@ -99,12 +100,20 @@ std::optional<Clipped> clipped_by_range(const Image& left, const Image& right, i
   if (disparities.empty() || static_cast<double>(disparities.size()) < kFewest * static_cast<double>(map.pixels())) {
     return std::nullopt;
   }
-  const auto above = std::count_if(disparities.begin(), disparities.end(), [&](float d) { return d > end - 1; });
-  const double share = static_cast<double>(above) / static_cast<double>(disparities.size());
-  if (share <= kClippedShare) return std::nullopt;
-  const auto at = static_cast<std::size_t>(std::lround(0.995 * static_cast<double>(disparities.size() - 1)));
-  const double high = nth_value(std::move(disparities), at);
-  return Clipped{share, 16 * static_cast<int>(std::ceil((1.1 * high - least + 1) / 16))};
+  const auto share_of = [&](const auto& is_outside) {
+    const auto count = std::count_if(disparities.begin(), disparities.end(), is_outside);
+    const double share = static_cast<double>(count) / static_cast<double>(disparities.size());
+    return share > kClippedShare ? share : 0;
+  };
+  const double near_share = share_of([&](float d) { return d > end - 1; });
+  const double far_share = share_of([&](float d) { return d < least - kBeyond_px; });
+  if (near_share == 0 && far_share == 0) return std::nullopt;
+  const auto quantile = [&](double share) -> double {
+    const auto at = static_cast<std::size_t>(std::lround(share * static_cast<double>(disparities.size() - 1)));
+    return nth_value(disparities, at);
+  };
+  return Clipped{near_share, far_share, 16 * static_cast<int>(std::ceil((1.1 * quantile(0.995) - least + 1) / 16)),
+                 static_cast<int>(std::floor(quantile(0.005))) - kBeyond_px};
 }
 
 }  // namespace egosgm::vision

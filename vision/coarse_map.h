@@ -14,13 +14,14 @@ namespace egosgm::vision {
 /// down. REQUIRES: images of one size, both kU8 or both kU16. Thread-safe.
 EGOSGM_EXPORT Image coarse_map(const Image& left, const Image& right, double row_offset_px, int least, int end);
 
-/// The part of a pair that is nearer than the range of disparities ends, by its coarse map.
+/// The parts of a pair that are nearer and farther than the range of disparities reaches, by its coarse map.
 struct Clipped {
-  double share;     // of the pixels of which the map is sure
-  int disparities;  // with which the range would hold nearly all
+  double near_share, far_share;  // of the pixels of which the map is sure; 0 where hardly anything is
+  int disparities;               // with which the range would hold nearly all that is near
+  int min_disparity;             // with which it would hold nearly all that is far
 };
 
-/// None where hardly anything is nearer, or where the map is sure of too little. REQUIRES: as coarse_map, rectified
+/// None where hardly anything is outside, or where the map is sure of too little. REQUIRES: as coarse_map, rectified
 /// images. Thread-safe.
 EGOSGM_EXPORT std::optional<Clipped> clipped_by_range(const Image& left, const Image& right, int least, int end);
 

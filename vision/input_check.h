@@ -32,8 +32,8 @@ EGOSGM_EXPORT std::optional<Suspicion> suspect_calibration(const Calibration& ca
 /// Checks a run's input once it is matched: a mean density below a half (maps of good input keep four
 /// fifths and more), no motion in most frames that have one before them, mosaics, images of 16 bits that hold 8 or
 /// whose bytes are exchanged, rows that are farther apart than the vertical alignment corrects, a camera that stands
-/// still while the other one does not, images of one value, one camera's images on both sides, what is nearer than the
-/// range, a suspected calibration.
+/// still while the other one does not, images of one value, one camera's images on both sides, what is nearer or
+/// farther than the range, a suspected calibration.
 class EGOSGM_EXPORT InputCheck {
  public:
   /// `calibration`: none where the images came without one, so that there is no motion either.

@@ -63,6 +63,13 @@ class Doubts(Brought):
         said = self.assert_works("run", self.street, "--disparities", enough, "--out", self.new_folder() / "out")
         self.assertNotIn("nearer than the range", said)
 
+    def test_what_is_farther_than_the_range_is_said_unless_it_is_beyond_infinity(self):
+        for doffs, least, share in ((0, 12, "[1-9][0-9]"), (-12, 12, None), (0, 0, None)):
+            arguments = *self.patterns(calib=self.calibrated(doffs_px=doffs)), "--min-disparity", least
+            said = self.assert_works("run", *arguments, "--out", self.new_folder() / "out")
+            with self.subTest(doffs=doffs, least=least):
+                self.assertRegex(said, rf"{share} % of the image is farther than the range \(--min-disparity -?[0-4]\)") if share else self.assertNotIn("farther than", said)
+
     def test_a_principal_point_and_a_focal_length_of_other_images(self):
         f, cx, cy, _ = self.calibration()
         for changes, named in ((dict(cx=cx / 4, cy=cy / 4), "principal point"), (dict(fx=f / 40, fy=f / 40), "focal lengths"),

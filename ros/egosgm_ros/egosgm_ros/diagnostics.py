@@ -35,11 +35,11 @@ class TellingNode(ParameterNode):
         self._waits_since = self._told_at  # for a pair
 
     def _look_at_input(self, images: Any, report: egosgm.FrameReport) -> None:
-        """What is nearer than the range, and what else speaks against the images or their calibration."""
+        """What is nearer or farther than the range, and what else speaks against the images or their calibration."""
         options = self._pipeline.options
         check = egosgm._egosgm._InputCheck(self._cameras.calibration, options["min_disparity"], options["disparities"])
         check.add(*images, report, True)
-        self._suspicion = check.text().replace("--disparities ", "disparities:=")
+        self._suspicion = check.text().replace("--disparities ", "disparities:=").replace("--min-disparity ", "min_disparity:=")
         if self._suspicion and not self._suspicion_told:
             self.get_logger().warning(self._suspicion)
             self._suspicion_told = True
