@@ -55,7 +55,7 @@ def point_cloud(frame: Any, max_sigma: float = 0.1, reasons: Union[str, Sequence
     A pixel stays where all of this holds: its depth's standard deviation is at most max_sigma of the depth (0.1: 10 %); its reason
     is one of `reasons` (names of egosgm.REASONS, such as "trusted"; None: all; run() needs it among its outputs); it is not farther
     than max_depth_m; and the disparity of one of its four neighbours differs by at most max_jump_px.
-    colors: an image to take the colours from, H x W or H x W x 3 (RGB), in place of the frame's left one.
+    colors: an image to take the colours from, H x W or H x W x 3 (RGB), in place of the frame's left one, which is grey where run() read files.
     """
     if frame.calibration is None:
         raise _egosgm.InvalidArgument("point_cloud: a disparity is no depth without a calibration: give it to run()")
