@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A matcher of single pairs with the calling form and the values of OpenCV's."""
-from typing import Any, Optional, Tuple
+from typing import Any, Optional, Tuple, Union
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ class Matcher:
     Each pair is matched alone, with eight paths unless `paths` says otherwise. All else is for Pipeline: device, preset and its options.
     """
 
-    def __init__(self, min_disparity: int = 0, disparities: int = 128, *, device: str = "", preset: str = "default", **options: Any) -> None:
+    def __init__(self, min_disparity: int = 0, disparities: int = 128, *, device: Union[str, int] = "", preset: str = "default", **options: Any) -> None:
         if options.pop("temporal", False):
             raise _egosgm.InvalidArgument("temporal: a Matcher matches each pair alone: leave it out; Pipeline and run() predict")
         options = {"preset": preset, "paths": 8, **options, "min_disparity": min_disparity, "disparities": disparities, "temporal": False}
@@ -23,7 +23,7 @@ class Matcher:
         end = self.min_disparity + self.disparities
         if not (self.min_disparity > -2047 and end <= 2047):
             raise _egosgm.InvalidArgument(f"disparities {self.min_disparity} to {end - 1} do not fit into 16 bits with 16 steps a pixel; Pipeline gives float")
-        self._options = {"device": device, **options}
+        self._options = {"device": str(device), **options}
         self._pipeline: Optional[_egosgm.Pipeline] = None
         self._made_for: Tuple[Any, ...] = ()
 
@@ -32,7 +32,7 @@ class Matcher:
 
     def compute(self, left: NDArray[Any], right: NDArray[Any]) -> NDArray[np.int16]:
         """A rectified pair of uint8 or uint16: grey, H x W, or colour as cv2.imread gives it, H x W x 3 or 4, BGR or BGRA."""
-        left, right = (image[..., 2::-1] if image.ndim == 3 and image.shape[2] in (3, 4) else image for image in map(np.asarray, (left, right)))
+        left, right = (image[..., 2::-1] if image.ndim == 3 and image.shape[2] in (3, 4) else image for image in map(np.asanyarray, (left, right)))  # with masks, which are refused
         made_for = left.shape[:2], left.dtype
         if self._pipeline is None or made_for != self._made_for:
             if len(made_for[0]) != 2:

@@ -215,7 +215,7 @@ def test_a_frame_has_its_own_images(street, frames):
 
 def test_without_motion_every_frame_is_searched_whole(street_folder):
     drive = egosgm.run(street_folder, frames="1:2", motion=False, **OPTIONS)
-    reports = [frame.report for frame in egosgm.run(street_folder, frames="1:2", motion=False, device=0, **OPTIONS)]
+    reports = [frame.report for frame in egosgm.run(street_folder, frames="1:2", motion=False, device=np.int64(0), **OPTIONS)]
     assert [report.searched_everything for report in reports] == [True, True] and "no motion" in repr(drive)
 
 
@@ -335,8 +335,9 @@ def test_the_matcher_has_opencvs_values(street, frames):
     eight, default = (egosgm.Matcher(disparities=48, **given).compute(frames[0].left, frames[0].right) for given in ({"paths": 8}, {}))
     np.testing.assert_array_equal(default, eight)
     assert (eight != found).any()
-    np.testing.assert_array_equal(egosgm.Matcher(disparities=48, paths=4, temporal=False).compute(frames[0].left, frames[0].right), found)
+    np.testing.assert_array_equal(egosgm.Matcher(disparities=48, paths=4, temporal=False, device=0).compute(frames[0].left, frames[0].right), found)
     for call, named in ((lambda: egosgm.Matcher(2000, 128), "do not fit"), (lambda: egosgm.Matcher(temporal=True), "matches each pair alone"), (lambda: matcher.compute(np.zeros(4, np.uint8), None), "H x W"),
+                        (lambda: matcher.compute(*[np.ma.masked_less(frames[0].left, 9)] * 2), "left has a mask"),
                         (lambda: egosgm.Matcher(numDisparities=64), "choose from"), (lambda: egosgm.Matcher(0, 64.5), "64.5"), (lambda: egosgm.Matcher(0, None), "None")):
         expect_refused(named, call)
 
