@@ -43,7 +43,7 @@ int estimate(const OdometryArguments& arguments, const CalibrationReader& read) 
   expect_no_folder("--out", arguments.out);
   vision::make_folder(std::filesystem::absolute(arguments.out).parent_path());
   expect_new_file("--out", arguments.out);
-  std::vector<Eigen::Isometry3d> poses;
+  std::vector<Isometry> poses;
   std::exception_ptr failure;
   catch_interrupts();
   try {

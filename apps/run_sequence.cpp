@@ -312,7 +312,7 @@ class Run {
   vision::StereoVideo video_;
   std::optional<Trace> trace_;
   Clock::time_point last_written_ = Clock::now();
-  std::vector<Eigen::Isometry3d> poses_;
+  std::vector<Isometry> poses_;
   std::string summary_;
   std::vector<std::string> notes_;
   int repeated_ = 0;  // frames

@@ -190,17 +190,17 @@ py::array_t<double> array_of(const Eigen::Isometry3d& transform) {
   return array;
 }
 
-std::vector<Eigen::Isometry3d> transforms_of(const py::object& matrices, const char* name) {
+std::vector<Isometry> transforms_of(const py::object& matrices, const char* name) {
   const py::array_t<double> values = doubles_of(matrices, name);
   if (values.ndim() != 3 || values.shape(1) != 4 || values.shape(2) != 4) {
     throw InvalidArgument(std::string(name) + " is " + shape_of(values) + ": give poses as an (N, 4, 4) array");
   }
-  std::vector<Eigen::Isometry3d> transforms;
+  std::vector<Isometry> transforms;
   for (py::ssize_t i = 0; i < values.shape(0); ++i) transforms.push_back(transform_at(values.data(i), 4, name));
   return transforms;
 }
 
-py::array_t<double> array_of(const std::vector<Eigen::Isometry3d>& transforms) {
+py::array_t<double> array_of(const std::vector<Isometry>& transforms) {
   py::array_t<double> array({static_cast<py::ssize_t>(transforms.size()), py::ssize_t{4}, py::ssize_t{4}});
   for (std::size_t i = 0; i < transforms.size(); ++i) store(transforms[i], array.mutable_data() + 16 * i);
   return array;

@@ -47,8 +47,8 @@ Eigen::Isometry3d transform_of(const py::object& matrix, const char* name);
 py::array_t<double> array_of(const Eigen::Isometry3d& transform);
 
 /// An (N, 4, 4) array.
-std::vector<Eigen::Isometry3d> transforms_of(const py::object& matrices, const char* name);
-py::array_t<double> array_of(const std::vector<Eigen::Isometry3d>& transforms);
+std::vector<Isometry> transforms_of(const py::object& matrices, const char* name);
+py::array_t<double> array_of(const std::vector<Isometry>& transforms);
 
 inline std::array<double, 3> values_of(const Eigen::Vector3d& vector) { return {vector.x(), vector.y(), vector.z()}; }
 

@@ -36,7 +36,8 @@ FrameMotion MotionSource::next(const VideoPair& pair, std::size_t frame) {
     last_pose_.reset();
     last_motion_ = Eigen::Isometry3d::Identity();
   }
-  const std::optional<Eigen::Isometry3d> pose = poses_.empty() ? pair.world_from_camera : std::optional(poses_[frame]);
+  const std::optional<Eigen::Isometry3d> pose =
+      poses_.empty() ? pair.world_from_camera : std::optional<Eigen::Isometry3d>(poses_[frame]);
   // A file has poses of all frames: odometry only looks at the first ones.
   if (odometry_ && (poses_.empty() || frames_ <= kLookedAt)) estimate(pair, result);
   if (pose) {
@@ -61,7 +62,8 @@ void MotionSource::take(const Eigen::Isometry3d& pose, FrameMotion& result) {
     const Eigen::Isometry3d given = current_from_previous(*last_pose_, pose);
     if (given_.size() < kLookedAt) {
       given_.push_back(given);
-      found_.push_back(result.motion ? std::optional(result.motion->current_from_previous) : std::nullopt);
+      found_.push_back(result.motion ? std::optional<Eigen::Isometry3d>(result.motion->current_from_previous)
+                                     : std::nullopt);
     }
     result.motion = Motion{.current_from_previous = given};
   }

@@ -50,7 +50,7 @@ class EGOSGM_EXPORT MotionSource {
   void take(const Eigen::Isometry3d& pose, FrameMotion& result);
   void follow(FrameMotion& result);
 
-  std::vector<Eigen::Isometry3d> poses_;
+  std::vector<Isometry> poses_;
   std::optional<StereoOdometry> odometry_;
   std::size_t frames_ = 0;
   std::optional<Eigen::Isometry3d> last_pose_;

@@ -71,21 +71,21 @@ Eigen::Isometry3d parse_pose(const std::filesystem::path& file, const TextRow& r
 
 }  // namespace
 
-std::vector<Eigen::Isometry3d> read_poses(const std::filesystem::path& file) {
+std::vector<Isometry> read_poses(const std::filesystem::path& file) {
   const std::string text = read_file(file, kMaxPosesBytes);
   std::vector<TextRow> rows = split_rows(text, file);
   while (!rows.empty() && trim(rows.back().text).empty()) rows.pop_back();
   if (rows.empty()) throw InvalidArgument(file.string() + ": holds no poses; give a row of 12 numbers per frame");
-  std::vector<Eigen::Isometry3d> poses;
+  std::vector<Isometry> poses;
   poses.reserve(rows.size());
   for (const TextRow& row : rows) poses.push_back(parse_pose(file, row));
   return poses;
 }
 
-void write_poses(const std::filesystem::path& file, const std::vector<Eigen::Isometry3d>& world_from_camera) {
+void write_poses(const std::filesystem::path& file, const std::vector<Isometry>& world_from_camera) {
   constexpr int kDecimals = 9;
   std::string text;
-  for (const Eigen::Isometry3d& pose : world_from_camera) {
+  for (const Isometry& pose : world_from_camera) {
     for (int i = 0; i < 12; ++i) {
       append_number(text, pose.matrix()(i / 4, i % 4), kDecimals);
       text += i < 11 ? ' ' : '\n';

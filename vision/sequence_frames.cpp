@@ -116,9 +116,9 @@ std::vector<std::size_t> rows_of_frames(const StereoSequence& sequence, std::siz
                         ", which belong to no choice of the frames; it may hold " + fitting);
 }
 
-std::vector<Eigen::Isometry3d> poses_of_frames(const StereoSequence& sequence, const fs::path& poses_file) {
-  const std::vector<Eigen::Isometry3d> rows = read_poses(poses_file);
-  std::vector<Eigen::Isometry3d> poses;
+std::vector<Isometry> poses_of_frames(const StereoSequence& sequence, const fs::path& poses_file) {
+  const std::vector<Isometry> rows = read_poses(poses_file);
+  std::vector<Isometry> poses;
   for (const std::size_t row : rows_of_frames(sequence, rows.size(), poses_file, "poses")) poses.push_back(rows[row]);
   return poses;
 }

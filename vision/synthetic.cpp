@@ -111,11 +111,11 @@ Calibration SyntheticSequence::calibration() const {
   return {camera.focal_px, camera.focal_px, camera.cx, camera.cy, synthetic::kBaseline_m, 0};
 }
 
-Eigen::Isometry3d SyntheticSequence::world_from_camera(int frame) const {
+Isometry SyntheticSequence::world_from_camera(int frame) const {
   if (frame < 0 || frame >= frames()) {
     throw InvalidArgument(text("synthetic frame ", frame, " does not exist: choose 0 to ", frames() - 1));
   }
-  if (frame == 0) return Eigen::Isometry3d::Identity();
+  if (frame == 0) return Isometry::Identity();
   return scene_->street.camera_pose(0).inverse() * scene_->street.camera_pose(frame);
 }
 
@@ -153,7 +153,7 @@ void write_sequence(const SyntheticOptions& options, const std::filesystem::path
     if (options.moving_object) make_folder(truth / map);
   }
 
-  std::vector<Eigen::Isometry3d> poses;
+  std::vector<Isometry> poses;
   std::string times, objects = std::string(kObjectColumns) + "\n";
   const auto write_rows = [&] {
     write_file(folder / "times.txt", times);

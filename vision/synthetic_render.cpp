@@ -336,7 +336,7 @@ void find_scene_flow(const Street& street, int frame, SyntheticSceneFlow& out) {
   const Camera camera = left_camera(street, frame), next = left_camera(street, frame + 1);
   const View view(street, solids, camera), next_view(street, next_solids, next);
   const double numerator = camera.focal_px * kBaseline_m;
-  const Eigen::Isometry3d of_camera = next.world_from_camera.inverse() * camera.world_from_camera;
+  const Isometry of_camera = next.world_from_camera.inverse() * camera.world_from_camera;
   std::map<int, SyntheticObject> objects = find_objects(solids, next_solids, camera, next);
   const Size size(camera.width, camera.height);
   out.flow = Image(size, kFlow, std::numeric_limits<float>::quiet_NaN());
@@ -354,7 +354,7 @@ void find_scene_flow(const Street& street, int frame, SyntheticSceneFlow& out) {
         o.left = std::min(o.left, x), o.right = std::max(o.right, x);
         o.top = std::min(o.top, y), o.bottom = std::max(o.bottom, y);
       }
-      const Eigen::Isometry3d& motion = id ? object->second.next_from_current : of_camera;
+      const Isometry& motion = id ? object->second.next_from_current : of_camera;
       const Eigen::Vector3d ray((x - camera.cx) / camera.focal_px, (y - camera.cy) / camera.focal_px, 1);
       const Eigen::Vector3d there = motion.linear() * ray + motion.translation() / hit.depth_m;  // by the depth
       if (there.z() <= 0) continue;

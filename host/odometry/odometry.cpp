@@ -169,13 +169,13 @@ void StereoOdometry::State::estimate(const std::optional<Eigen::Isometry3d>& pri
   std::vector<CircularMatch> refined;
   std::vector<int> all(previous.left_features.size());
   std::iota(all.begin(), all.end(), 0);
-  const auto candidates = match_circle(calibration, previous, current, all, &rough.motion.current_from_previous,
-                                       kGuidedWindow, max_disparity_px(current.left.width));
-  auto points = refine_matches(calibration, previous, current, candidates, rough.motion.current_from_previous, refined);
+  const Eigen::Isometry3d motion = rough.motion.current_from_previous;
+  const auto candidates =
+      match_circle(calibration, previous, current, all, &motion, kGuidedWindow, max_disparity_px(current.left.width));
+  auto points = refine_matches(calibration, previous, current, candidates, motion, refined);
   if (options.learn_rectification) rectification.correct(calibration, points);
   result.times_ms.matching = stopwatch.lap();
-  const MotionEstimate fine =
-      refine_motion(calibration, options, MatchNoise{}, points, rough.motion.current_from_previous);
+  const MotionEstimate fine = refine_motion(calibration, options, MatchNoise{}, points, motion);
   result.times_ms.motion = stopwatch.lap();
   result.matches = static_cast<int>(points.size());
   result.inliers = static_cast<int>(fine.inliers.size());
@@ -224,7 +224,7 @@ StereoOdometry::StereoOdometry(StereoOdometry&&) noexcept = default;
 StereoOdometry& StereoOdometry::operator=(StereoOdometry&&) noexcept = default;
 
 OdometryResult StereoOdometry::process(const ImageView& left, const ImageView& right,
-                                       const std::optional<Eigen::Isometry3d>& prior) {
+                                       const std::optional<Isometry>& prior) {
   check_images(left, right);
   if (prior) Motion{*prior}.validate();
   State& state = *state_;

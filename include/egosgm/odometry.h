@@ -81,7 +81,7 @@ class EGOSGM_EXPORT StereoOdometry {
   /// Throws InvalidArgument where the images are empty, differ in size or type, have rows that overlap, or
   /// changed size since the last frame, or the prior is no motion; the state is then as before the call.
   OdometryResult process(const ImageView& left, const ImageView& right,
-                         const std::optional<Eigen::Isometry3d>& prior = std::nullopt);
+                         const std::optional<Isometry>& prior = std::nullopt);
 
   /// Forgets all frames: the next one is a first frame.
   void reset();

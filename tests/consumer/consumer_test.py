@@ -64,7 +64,7 @@ class Installed(unittest.TestCase):
         projects = [(SOURCE, PROGRAMS)] + ([(self.page_project(), ["YOURS"])] if OPENCV else [])
         for kind, shared, source, programs in [(*of, *project) for of in (("shared", "ON"), ("static", "OFF")) for project in projects]:
             with self.subTest(kind, source=source):
-                build, done = self.configure(f"-DBUILD_SHARED_LIBS={shared}", source=source)
+                build, done = self.configure(f"-DBUILD_SHARED_LIBS={shared}", "-DCMAKE_CXX_FLAGS=-march=native", source=source)
                 self.assertEqual(done.returncode, 0, done.stdout)
                 self.assert_runs("cmake", "--build", build)
                 for program in programs:

@@ -8,6 +8,9 @@
 #include <cstdio>
 #include <vector>
 
+// Else -march=native would move what lies behind a motion.
+static_assert(alignof(egosgm::Motion) == alignof(double));
+
 int main() try {
   constexpr int kWidth = 320, kHeight = 160, kShift_px = 5;
   std::vector<std::uint8_t> left(kWidth * kHeight), right(left.size());

@@ -2,10 +2,14 @@
 #include <egosgm/error.h>
 #include <egosgm/vision/disparity_io.h>
 #include <egosgm/vision/frame_maps.h>
+#include <egosgm/vision/moving_objects.h>
 #include <egosgm/vision/odometry.h>
 #include <egosgm/vision/synthetic.h>
 
 #include <cstdio>
+
+static_assert(alignof(egosgm::vision::MovingObject) == alignof(double));
+static_assert(alignof(egosgm::vision::SyntheticObject) == alignof(double));
 
 int main() try {
   egosgm::vision::SyntheticOptions options;

@@ -20,7 +20,7 @@ const std::string kIdentity = "1 0 0 0 0 1 0 0 0 0 1 0\n";
 TEST(PosesIo, RoundTrip) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> value(-3, 3);
-  std::vector<Eigen::Isometry3d> poses;
+  std::vector<Isometry> poses;
   for (int k = 0; k < 20; ++k) {
     Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
     pose.linear() = Eigen::AngleAxisd(value(random), Eigen::Vector3d(value(random), value(random), 1).normalized())

@@ -480,7 +480,7 @@ TEST_F(SyntheticFiles, SequenceReadsBackAsItWasRendered) {
   EXPECT_NEAR(read.cy, truth.cy, 1e-9);
   EXPECT_NEAR(read.baseline_m, truth.baseline_m, 1e-9);
   EXPECT_NEAR(read.doffs_px, 0, 1e-9);
-  const std::vector<Eigen::Isometry3d> poses = read_poses(folder_ / "poses.txt");
+  const std::vector<Isometry> poses = read_poses(folder_ / "poses.txt");
   ASSERT_EQ(poses.size(), 2u);
   EXPECT_TRUE(poses[1].isApprox(sequence.world_from_camera(1), 1e-8));
 }

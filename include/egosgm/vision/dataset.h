@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <Eigen/Geometry>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -9,6 +8,7 @@
 
 #include "egosgm/calibration.h"
 #include "egosgm/export.h"
+#include "egosgm/motion.h"
 #include "egosgm/vision/image.h"
 
 namespace egosgm::vision {
@@ -107,7 +107,7 @@ EGOSGM_EXPORT std::vector<std::size_t> rows_of_frames(const StereoSequence& sequ
                                                       const std::filesystem::path& file, const std::string& what);
 
 /// The pose of each frame, by rows_of_frames. Throws as it and read_poses do.
-EGOSGM_EXPORT std::vector<Eigen::Isometry3d> poses_of_frames(const StereoSequence& sequence,
-                                                             const std::filesystem::path& poses_file);
+EGOSGM_EXPORT std::vector<Isometry> poses_of_frames(const StereoSequence& sequence,
+                                                    const std::filesystem::path& poses_file);
 
 }  // namespace egosgm::vision

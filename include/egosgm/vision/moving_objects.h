@@ -23,7 +23,7 @@ struct MovingObject {
   Eigen::Vector3d centre_m{0, 0, 0};             // of its visible surface, in the camera's frame
   Eigen::Vector3d velocity_m{0, 0, 0};  // of the centre per frame, without the camera's motion, in the camera's frame
   Eigen::Matrix3d velocity_covariance_m2 = Eigen::Matrix3d::Zero();
-  Eigen::Isometry3d current_from_previous = Eigen::Isometry3d::Identity();  // of its points, between camera frames
+  Isometry current_from_previous = Isometry::Identity();  // of its points, between camera frames
 };
 
 /// The objects of a frame. `labels`: kU8, the object's id at each pixel of the left view, or 0.

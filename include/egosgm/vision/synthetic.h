@@ -45,7 +45,7 @@ struct SyntheticFrame {
   Image left_disparity, right_disparity;  // kF32, x_left - x_right >= 0 [px]
   Image left_noc, right_noc;              // kU8: 255 where the other camera sees the same surface point, else 0
   Image left_moving, right_moving;        // kU8: 255 on moving objects, else 0
-  Eigen::Isometry3d world_from_camera;    // left camera's pose; identity for frame 0
+  Isometry world_from_camera;             // left camera's pose; identity for frame 0
 };
 
 /// What moves by itself and shows in the left image of a frame.
@@ -53,7 +53,7 @@ struct SyntheticObject {
   int id = 0;                                      // 1..255, its pixels in SyntheticSceneFlow::objects
   int left = 0, top = 0, right = -1, bottom = -1;  // box of its pixels, all four within it
   Eigen::Vector3d centre_m, velocity_m;  // in the camera's frame; velocity: its own, without the camera's, per frame
-  Eigen::Isometry3d next_from_current;   // its points, from this camera's frame to the next one's
+  Isometry next_from_current;            // its points, from this camera's frame to the next one's
 };
 
 /// Where the surfaces of a left image are one frame later, exact at each pixel's centre, also where they are hidden
@@ -83,7 +83,7 @@ class EGOSGM_EXPORT SyntheticSequence {
   Calibration calibration() const;
 
   /// REQUIRES (all of these): 0 <= frame < frames(), else InvalidArgument.
-  Eigen::Isometry3d world_from_camera(int frame) const;
+  Isometry world_from_camera(int frame) const;
   /// The motion from frame - 1 to `frame`, covariance zero; identity for frame 0.
   Motion motion(int frame) const;
   SyntheticFrame render(int frame) const;
