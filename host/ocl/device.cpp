@@ -5,6 +5,7 @@
 #include <cctype>
 #include <charconv>
 #include <cstdlib>
+#include <initializer_list>
 #include <mutex>
 #include <optional>
 #include <string_view>
@@ -181,6 +182,16 @@ Found find_devices() {
   return found;
 }
 
+/// What may keep devices from programs: those of the environment's variables that are set, each with its value.
+std::string of_variables(std::initializer_list<const char*> names) {
+  std::string text;
+  for (const char* name : names) {
+    const char* value = std::getenv(name);
+    if (value) text += std::string("; ") + name + " is set to \"" + value + "\", which may hide one: unset it";
+  }
+  return text;
+}
+
 /// Describes platforms that have no device; empty without such.
 std::string of_platforms_without(const std::vector<std::string>& platforms) {
   std::string text;
@@ -189,7 +200,7 @@ std::string of_platforms_without(const std::vector<std::string>& platforms) {
     text += (text.empty() ? "the platform \"" : "; the platform \"") + platform +
             "\" is there, but has no device: " + (remedy.empty() ? "may this user open its device files?" : remedy);
   }
-  return text;
+  return text.empty() ? text : text + of_variables({"POCL_DEVICES", "CUDA_VISIBLE_DEVICES"});
 }
 
 /// The device that `name` (lower case) means as a whole: an index, a type, a part of a name. Null: none. `origin` is
@@ -250,7 +261,8 @@ Device Device::select(const std::string& wanted) {
     throw InvalidArgument("no OpenCL device: " +
                           (without.empty()
                                ? "install one, for the CPU `apt install pocl-opencl-icd` (Debian, Ubuntu) or, for "
-                                 "Python alone, `pip install intel-opencl-rt`"
+                                 "Python alone, `pip install intel-opencl-rt`" +
+                                     of_variables({"OCL_ICD_VENDORS", "OCL_ICD_FILENAMES"})
                                : without));
   }
   const char* from_environment = std::getenv("EGOSGM_DEVICE");

@@ -86,7 +86,7 @@ class Help(ProgramTest):
     def test_without_a_device_it_says_how_to_install_one(self):
         nothing = dict(os.environ, OCL_ICD_VENDORS="/nonexistent")
         self.assert_refused(["devices"], "pocl-opencl-icd", env=nothing)
-        self.assert_refused(["run", "--odometry", self.street, "--out", self.new_folder()], "pocl-opencl-icd", env=nothing)
+        self.assert_refused(["run", "--odometry", self.street, "--out", self.new_folder()], 'OCL_ICD_VENDORS is set to "/nonexistent"', env=nothing)
 
     def test_a_platform_without_a_device_is_told_from_none(self):
         """PoCL has no device where it cannot make its cache."""
@@ -97,6 +97,12 @@ class Help(ProgramTest):
             self.assertEqual(done.returncode, 2)
             self.assertRegex(done.stderr, r"^egosgm: error: no OpenCL device: the platform .* is there, but has no device: .*POCL_CACHE_DIR.*HOME.*\n$")
             self.assertNotIn("apt install", done.stderr)
+
+    def test_a_variable_that_hides_devices_is_named(self):
+        done = egosgm("devices", env=dict(os.environ, POCL_DEVICES="no such driver"))
+        if done.returncode == 0:
+            self.skipTest("a driver that does not ask this variable")
+        self.assertIn('POCL_DEVICES is set to "no such driver", which may hide one: unset it', done.stderr)
 
     def test_a_cache_that_cannot_be_written_is_told_of_where_a_kernel_does_not_build(self):
         out, cache = self.new_folder() / "out", self.new_folder()
