@@ -23,6 +23,7 @@
 
 #include "egosgm/calibration.h"
 #include "egosgm/device.h"
+#include "egosgm/error.h"
 #include "egosgm/frame.h"
 #include "egosgm/named_options.h"
 #include "egosgm/odometry.h"
@@ -97,6 +98,11 @@ class Disparity : public rclcpp::Node {
 
     rclcpp::QoS qos = rclcpp::SensorDataQoS();
     if (parameter("reliable", "false") == "true") qos.reliable();
+    for (const auto& [name, value] : get_node_parameters_interface()->get_parameter_overrides()) {
+      if (has_parameter(name) || name.rfind("qos_overrides.", 0) == 0) continue;
+      throw egosgm::InvalidArgument("parameter " + name +
+                                    ": the node has none of this name; docs/use/robots.md names them");
+    }
     const rclcpp::QoS newest = rclcpp::QoS(qos).keep_last(1);  // what waits while a pair is matched is replaced
     disparity_ = create_publisher<DisparityImage>("disparity", qos);
     depth_ = create_publisher<Image>("depth", qos);
