@@ -47,7 +47,8 @@ int estimate(const OdometryArguments& arguments, const CalibrationReader& read) 
   std::exception_ptr failure;
   catch_interrupts();
   try {
-    Progress progress(static_cast<int>(sequence.frames.size()), arguments.quiet);
+    // Poses on the standard output stay alone.
+    Progress progress(static_cast<int>(sequence.frames.size()), arguments.quiet || vision::is_stream(arguments.out));
     if (!sequence.note.empty()) progress.note(sequence.note);
     while (!interrupted()) {
       const std::optional<vision::VideoPair> pair = source.next();

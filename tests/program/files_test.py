@@ -226,6 +226,8 @@ class Streams(FilesTest):
             subprocess.run([PROGRAM, "run", "--odometry", self.street, "--out", out / "more", "--frames", "0", *map(str, METHOD), "--save-config", "/dev/stdout"],
                            stdout=saved, check=True, timeout=900)
         self.assertIn("\ndisparities = 16\n", (out / "saved.toml").read_text())
+        poses = self.assert_works("odometry", self.street, "--out", "/dev/stdout")
+        self.assertEqual({len(row.split()) for row in poses.splitlines()}, {12})
 
     @unittest.skipUnless(os.geteuid() == 0, "devices are made by root alone")
     def test_a_device_stays_one(self):
