@@ -35,6 +35,15 @@ void reverse_colors(Image& pixels) {
   pixels.type.channel == ChannelType::kU8 ? reverse(std::uint8_t{}) : reverse(std::uint16_t{});
 }
 
+int highest_value(const Image& deep) {
+  int highest = 0;
+  for (int y = 0; y < deep.rows; ++y) {
+    const auto* row = deep.row<std::uint16_t>(y);
+    highest = std::max<int>(highest, *std::max_element(row, row + deep.cols * deep.type.channels));
+  }
+  return highest;
+}
+
 }  // namespace
 
 Image grey_of_colors(const Image& colors, ColorOrder order) {
@@ -59,14 +68,7 @@ Image color_grey(const Image& grey) {
     throw InvalidArgument("color_grey: the image must be uint8 or uint16 and not empty");
   }
   Image bytes = grey, picture(grey.size(), kBgr8);
-  if (grey.type.channel == ChannelType::kU16) {
-    int highest = 0;
-    for (int y = 0; y < grey.rows; ++y) {
-      const auto* row = grey.row<std::uint16_t>(y);
-      highest = std::max<int>(highest, *std::max_element(row, row + grey.cols));
-    }
-    bytes = as_bytes(grey, highest > 0 ? 255.0 / highest : 1.0);
-  }
+  if (grey.type.channel == ChannelType::kU16) bytes = as_bytes(grey, 255.0 / std::max(1, highest_value(grey)));
   for (int y = 0; y < bytes.rows; ++y) {
     const std::uint8_t* row = bytes.row(y);
     std::transform(row, row + bytes.cols, picture.row<Color>(y), [](auto v) { return Color{v, v, v}; });
@@ -88,7 +90,12 @@ Image read_stored_image(const std::filesystem::path& file) {
 Image read_color_image(const std::filesystem::path& file) {
   Image pixels = decode_image(file);
   if (pixels.type.channels == 1) return color_grey(pixels);
-  if (pixels.type.channel == ChannelType::kU16) pixels = as_bytes(pixels, 1.0 / 256.0, -0.499);  // the upper 8 bits
+  if (pixels.type.channel == ChannelType::kU16) {
+    const int highest = highest_value(pixels);
+    int bits = 8;
+    while (highest >> bits) ++bits;
+    pixels = as_bytes(pixels, 1.0 / (1 << (bits - 8)), -0.499);
+  }
   reverse_colors(pixels);
   return pixels;
 }

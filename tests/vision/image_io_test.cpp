@@ -128,6 +128,9 @@ TEST_F(ImageIo, ColorIsReadAsItIs) {
     ASSERT_TRUE(cv::imwrite((folder_ / "deep.png").string(), deep));
     expect_equal(read_color_image(folder_ / "deep.png"), image);
   }
+  image.convertTo(deep, CV_16U, 16, 15);  // of a camera with 12 bits
+  write_png(folder_ / "deep.png", deep);
+  expect_equal(read_color_image(folder_ / "deep.png"), image);
   write_png(folder_ / "grey.png", cv::Mat(3, 4, CV_8UC1, cv::Scalar(7)));
   expect_equal(read_color_image(folder_ / "grey.png"), cv::Mat(3, 4, CV_8UC3, cv::Scalar::all(7)));
 }

@@ -25,8 +25,8 @@ EGOSGM_EXPORT Image read_grey_image(const std::filesystem::path& file);
 /// does. Thread-safe.
 EGOSGM_EXPORT Image read_stored_image(const std::filesystem::path& file);
 
-/// Reads such a file to be looked at: kBgr8, BGR. Colour of 16 bits keeps its upper 8, grey is stretched as
-/// color_grey does. Throws as read_grey_image does. Thread-safe.
+/// Reads such a file to be looked at: kBgr8, BGR. Colour of 16 bits keeps the upper 8 of as many bits as its values
+/// have; grey is stretched as color_grey does. Throws as read_grey_image does. Thread-safe.
 EGOSGM_EXPORT Image read_color_image(const std::filesystem::path& file);
 
 /// Whether a grey image of 16 bits holds values below 256 only, as where 8-bit images were saved with 16. The strength
