@@ -154,9 +154,9 @@ SequenceJob RunArguments::job(const Package& package) const {
   }
   job.source = source_of(*this, package);
   SequenceArguments looked_at = input;
-  if (!bag.bag.empty() || input.videos()) looked_at.frames = "";  // `doctor` takes no frames of them
-  job.input = bag.bag.empty() ? looked_at.text() : bag.text();
-  if (!bag.bag.empty() && !input.calib.empty()) job.input += " " + looked_at.text();
+  if (job.source->has_no_files()) looked_at.frames = "";  // `doctor` takes no frames of bags and videos
+  job.input = looked_at.text();
+  if (!bag.bag.empty()) job.input = bag.text() + (job.input.empty() ? "" : " " + job.input);
   job.poses_file = poses;
   job.odometry = odometry;
   expect_takeable(*this, job);

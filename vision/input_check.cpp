@@ -150,8 +150,8 @@ std::optional<Suspicion> suspect_calibration(const Calibration& c, Size size) {
 void InputCheck::add(const Image& left, const Image& right, const FrameReport& report, bool has_motion) {
   if (frames_ % kFramesPerLook == 0) {
     const std::optional<Clipped> clipped = clipped_by_range(left, right, least_, end_);
-    const auto share_of = [](const Clipped& each) { return each.near_share + each.far_share; };
-    if (clipped && (!clipped_ || share_of(*clipped) > share_of(*clipped_))) clipped_ = clipped;
+    if (clipped && clipped->near_share > nearer_.near_share) nearer_ = *clipped;
+    if (clipped && clipped->far_share > farther_.far_share) farther_ = *clipped;
     ++looks_;
     const auto [left_bytes, right_bytes] = bytes_of(left, right);
     const bool is_swapped = holds_swapped_bytes(left) || holds_swapped_bytes(right);
@@ -206,14 +206,14 @@ std::string InputCheck::text() const {
                      "of other moments: leave them out)",
                      name, frozen_[side]));
   }
-  if (clipped_ && clipped_->near_share > 0) {
-    append(text, formatted("%.0f %% of the image is nearer than the range (--disparities %d)",
-                           100 * clipped_->near_share, clipped_->disparities));
+  if (nearer_.near_share > 0) {
+    append(text, formatted("%.0f %% of the image is nearer than the range (--disparities %d)", 100 * nearer_.near_share,
+                           nearer_.disparities));
   }
   // Beyond infinity is nothing but mismatches, and what cameras see whose images were exchanged.
-  if (clipped_ && clipped_->far_share > 0 && calibration_ && least_ > -calibration_->doffs_px) {
+  if (farther_.far_share > 0 && calibration_ && least_ > -calibration_->doffs_px) {
     append(text, formatted("%.0f %% of the image is farther than the range (--min-disparity %d)",
-                           100 * clipped_->far_share, clipped_->min_disparity));
+                           100 * farther_.far_share, farther_.min_disparity));
   }
   if (!calibration_) return text;
   if (const auto suspicion = suspect_calibration(*calibration_, size_)) {

@@ -57,7 +57,7 @@ class EGOSGM_EXPORT InputCheck {
   std::size_t plain_[2] = {};  // frames in which a camera's image is of one value
   std::size_t frames_ = 0, without_motion_ = 0, narrow_ = 0, far_rows_ = 0, same_ = 0;
   std::size_t looks_ = 0, mosaics_ = 0, swapped_ = 0;
-  std::optional<Clipped> clipped_;  // of the pair of which the range clips most
+  Clipped nearer_{}, farther_{};  // of the pairs of which the range clips most at either end
 };
 
 }  // namespace egosgm::vision

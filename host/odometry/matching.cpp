@@ -51,13 +51,13 @@ Box around(double x, double y, const SearchWindow& window) {
           static_cast<int>(std::ceil(y - window.y_px)), static_cast<int>(std::floor(y + window.y_px))};
 }
 
-int match_to_left(TrackedFrame& frame, int right, const DisparityRange& range) {
+int match_to_left(TrackedFrame& frame, int right, const StereoWindow& window) {
   int& known = frame.left_of_right[right];
   if (known == kUnknown) {
     const Feature& f = frame.right_features.features[right];
     known =
         best_match(frame.left_features, frame.right_features.classes[right], frame.right_features.descriptors[right],
-                   {f.x + range.least, f.x + range.most, f.y - kStereoRows_px, f.y + kStereoRows_px});
+                   {f.x + window.least_px, f.x + window.most_px, f.y - kStereoRows_px, f.y + kStereoRows_px});
   }
   return known;
 }
@@ -110,13 +110,13 @@ void TrackedFrame::reset_matches() {
   }
 }
 
-int stereo_match(TrackedFrame& frame, int i, const DisparityRange& range) {
+int stereo_match(TrackedFrame& frame, int i, const StereoWindow& window) {
   int& known = frame.right_of_left[i];
   if (known == kUnknown) {
     const Feature& f = frame.left_features.features[i];
     known = best_match(frame.right_features, frame.left_features.classes[i], frame.left_features.descriptors[i],
-                       {f.x - range.most, f.x - range.least, f.y - kStereoRows_px, f.y + kStereoRows_px});
-    if (known != kNoMatch && match_to_left(frame, known, range) != i) known = kNoMatch;
+                       {f.x - window.most_px, f.x - window.least_px, f.y - kStereoRows_px, f.y + kStereoRows_px});
+    if (known != kNoMatch && match_to_left(frame, known, window) != i) known = kNoMatch;
   }
   return known;
 }
@@ -125,11 +125,11 @@ std::vector<CircularMatch> match_circle(const Calibration& calibration, TrackedF
                                         const std::vector<int>& queries, const Eigen::Isometry3d* motion,
                                         const SearchWindow& window, int max_disparity_px) {
   const int infinity_px = static_cast<int>(std::lround(std::clamp(-calibration.doffs_px, -1e6, 1e6)));
-  const DisparityRange range{infinity_px - kBeyondInfinity_px, infinity_px + max_disparity_px};
+  const StereoWindow stereo{infinity_px - kBeyondInfinity_px, infinity_px + max_disparity_px};
   std::vector<CircularMatch> matches;
   matches.reserve(queries.size());
   for (const int i : queries) {
-    const int previous_right = stereo_match(previous, i, range);
+    const int previous_right = stereo_match(previous, i, stereo);
     if (previous_right == kNoMatch) continue;
     const Feature& left = previous.left_features.features[i];
     const int feature_class = previous.left_features.classes[i];
@@ -139,7 +139,7 @@ std::vector<CircularMatch> match_circle(const Calibration& calibration, TrackedF
     const int j = best_match(current.left_features, feature_class, previous.left_features.descriptors[i],
                              around(left.x + flow.left_x, left.y + flow.y, window));
     if (j == kNoMatch) continue;
-    const int current_right = stereo_match(current, j, range);
+    const int current_right = stereo_match(current, j, stereo);
     if (current_right == kNoMatch) continue;
     const Feature& right = current.right_features.features[current_right];
     const int back =

@@ -44,12 +44,12 @@ struct SearchWindow {
   double x_px, y_px;  // farthest from the predicted place
 };
 
-struct DisparityRange {
-  int least, most;  // [px], inclusive
+struct StereoWindow {
+  int least_px, most_px;  // disparities
 };
 
 /// The right feature that best matches left feature `i`, and whose best match `i` is.
-int stereo_match(TrackedFrame& frame, int i, const DisparityRange& range);
+int stereo_match(TrackedFrame& frame, int i, const StereoWindow& window);
 
 /// Closes the circle for each of the previous frame's left features in `queries`. With `motion`, the search is
 /// around the place where it takes a static point; without, around the last place. Stereo matches lie at most

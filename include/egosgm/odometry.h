@@ -33,7 +33,7 @@ struct EGOSGM_EXPORT StereoOdometryOptions {
   int ransac_iterations = 500;
   double inlier_threshold_px = 1.5;  // reprojection error
   int min_inliers = 20;
-  double min_inlier_ratio = 0.65;  // of the circular matches; where near and far points disagree, it is about 0.5
+  double min_inlier_ratio = 0.65;  // of the circular matches; it is less where near and far points disagree
   std::uint64_t seed = 1;          // of the sampling; nothing else is random
 
   /// Throws InvalidArgument, naming the value, unless every value is finite and in its range.

@@ -86,7 +86,7 @@ class Help(ProgramTest):
     def test_without_a_device_it_says_how_to_install_one(self):
         nothing = dict(os.environ, OCL_ICD_VENDORS="/nonexistent")
         self.assert_refused(["devices"], "pocl-opencl-icd", env=nothing)
-        self.assert_refused(["run", "--odometry", self.street, "--out", self.new_folder()], 'OCL_ICD_VENDORS is set to "/nonexistent"', env=nothing)
+        self.assert_refused(["run", "--odometry", self.street, "--out", self.new_folder()], "pocl-opencl-icd", 'OCL_ICD_VENDORS is set to "/nonexistent"', env=nothing)
 
     def test_a_platform_without_a_device_is_told_from_none(self):
         """PoCL has no device where it cannot make its cache."""

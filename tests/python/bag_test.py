@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bags of robots: what is read equals the images that were recorded, in pairs by their stamps."""
 import json
+import shlex
 
 import numpy as np
 import pytest
 
 import egosgm
 from egosgm import bag as bags
-from bag_case import FRAMES, HEIGHT, OPTIONS, RATE_NS, SEED, SET, SIDES, START, TOPICS, WIDTH, Recording, drive_of, program, record, refused, with_a_broken_message  # noqa: F401  some for the fixtures
+from egosgm.program import run_tool
+from bag_case import FRAMES, HEIGHT, OPTIONS, RATE_NS, SEED, SET, SIDES, START, TOPICS, WIDTH, Recording, drive_of, program, record, refused, told_of, with_a_broken_message  # noqa: F401  some for the fixtures
 from refusals import expect_refused
 
 
@@ -53,6 +55,14 @@ def test_python_runs_a_bag(tmp_path, street, frames):
     assert [frame.report.unpredicted for frame in egosgm.run(bag.path, progress=False, **OPTIONS)] == ["first frame", "", "reset", ""]
     assert program("--bag", bag.path, *TOPICS, *SET, "--out", tmp_path / "out").returncode == 0
     assert [frame["unpredicted"] for frame in json.loads((tmp_path / "out/report.json").read_text())["frames"]] == ["first frame", "", "reset", ""]
+
+
+def test_the_command_that_a_warning_names_works(tmp_path, street, frames, calib, capfd):
+    path = record("mcap", tmp_path / "drive", street, frames)
+    said = told_of(capfd, path, "--calib", calib, "--frames", ":1", "--set", "disparities=16")
+    command = shlex.split(said[said.index("`egosgm doctor "):].split("`")[1])[1:]
+    assert command[:2] == ["doctor", "--bag"] and command[-2:] == ["--calib", calib]
+    assert run_tool([*command, "--disparities", "16"]) == 2 and "it clips" in capfd.readouterr().out
 
 
 def test_stamps_pair_within_their_bound_and_gaps_are_told(tmp_path, street, frames):

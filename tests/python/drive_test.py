@@ -375,6 +375,15 @@ def test_a_look_at_what_is_nearer_takes_little_memory_whatever_the_shape():
         assert max(egosgm._egosgm._coarse_map(image, image, 0.0, 0, 16).shape) <= 256
 
 
+def test_pairs_whose_views_were_exchanged_hide_nothing_that_is_nearer(street, frames):
+    check = egosgm._egosgm._InputCheck(street.calibration, 0, 16)
+    report = egosgm.Pipeline(street.calibration, WIDTH, HEIGHT, **OPTIONS).process(frames[0].left, frames[0].right).report
+    for i in range(51):  # the first and the last of them are looked at
+        left, right = (frames[0].left, frames[0].right) if i < 50 else (frames[0].right, frames[0].left)
+        check.add(left, right, report, True)
+    assert "nearer than the range" in check.text() and "farther" not in check.text()
+
+
 @pytest.mark.filterwarnings("error")
 def test_images_of_a_few_rows_or_columns_are_examined():
     for shape in ((1, 1), (1, 600), (2, 600), (3, 600), (600, 1), (600, 2)):
