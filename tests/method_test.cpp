@@ -55,8 +55,13 @@ TEST(Method, BuildsWhatItsOptionsNeed) {
   }
   Built alone([](auto& o) { o.temporal = false; });
   alone.method.prepare(PixelType::kU8, {Output::kDynamic});
-  for (const char* file : {"dynamic_map.cl", "forward_warp.cl", "kalman_update.cl", "coarse_match.cl"}) {
+  for (const char* file : {"dynamic_map.cl", "forward_warp.cl", "hole_fill.cl"}) {
     EXPECT_FALSE(alone.has(file)) << file;
+  }
+  const Built matcher([](auto& o) { o.temporal = o.evidence.enabled = false; });
+  for (const char* file : {"kalman_update.cl", "coarse_match.cl"}) {
+    EXPECT_TRUE(alone.has(file)) << file;
+    EXPECT_FALSE(matcher.has(file)) << file;
   }
 }
 

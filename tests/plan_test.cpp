@@ -62,8 +62,9 @@ constexpr Case kCases[] = {
     {true, kFull, false, kReset, true, "reset | everything | tracks left | matches left right x1"},
     {true, kFull, true, {}, true, "- | everything | tracks left right | matches left right x1"},
     {true, kFull, true, {}, false, "no motion | everything | tracks left right | matches left right x1"},
-    {false, kBand, false, {}, true, "not temporal | everything | tracks left | matches left right x1"},
-    {false, kBand, true, kFirstFrame, false, "not temporal | everything | tracks left right | matches left right x1"},
+    {false, kBand, false, {}, true, "not temporal | everything | tracks left | matches left right x1 | coarse"},
+    {false, kBand, true, kFirstFrame, false,
+     "not temporal | everything | tracks left right | matches left right x1 | coarse"},
     {false, kFull, false, kReset, true, "not temporal | everything | tracks left | matches left right x1"},
 };
 

@@ -39,7 +39,7 @@ void Method::predict(const Plan& plan, const Belief& belief, Prediction& predict
   if (plan.predicts()) {
     predict_->predict(plan, belief, prediction);
   } else if (plan.fuses) {
-    predict_->predict_nothing(prediction);
+    prediction.fill_with_nothing(context_);
   }
 }
 
@@ -92,7 +92,8 @@ Workspace::Workspace(ocl::Context& context, shared::ImageSize size, const Method
 
 Method::Method(ocl::Context& context, shared::ImageSize size, const Calibration& calibration,
                const MethodOptions& options, const Tuning& tuning)
-    : options_(options),
+    : context_(context),
+      options_(options),
       work_(context, size, options),
       unknown_(context),
       alignment_([=, &context, sums = VerticalAlignment::Sums(context, size),
@@ -102,9 +103,8 @@ Method::Method(ocl::Context& context, shared::ImageSize size, const Calibration&
       match_(context, size, options, tuning),
       search_(context, size, options, tuning),
       publish_(context, size, calibration, options) {
-  if (!options.temporal) return;
-  predict_.emplace(context, size, calibration, options, tuning);
-  fuse_.emplace(context, size, options);
+  if (options.temporal) predict_.emplace(context, size, calibration, options, tuning);
+  if (may_fuse(options)) fuse_.emplace(context, size, options);
 }
 
 void Method::prepare(PixelType type, const Wanted& wanted) {

@@ -74,6 +74,7 @@ class Method {
   Map confirmed(const Plan& plan, const Belief& belief, Map& confirmed);
   const FlagMap* evidence_of(const Belief& belief) const;
 
+  ocl::Context& context_;
   const MethodOptions options_;
   Workspace work_;
   const VerticalOffset unknown_;

@@ -19,6 +19,8 @@ std::optional<Unpredicted> why_not(const MethodOptions& options, std::optional<U
 
 }  // namespace
 
+bool may_fuse(const MethodOptions& options) { return options.temporal || Evidence::is_of(options); }
+
 Plan plan_of(const MethodOptions& options, std::optional<Unpredicted> why_no_belief, bool knows_offset,
              const std::optional<Motion>& motion, const Wanted& wanted, bool repeats) {
   Plan plan{};

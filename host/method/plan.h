@@ -37,6 +37,9 @@ struct Plan {
   Views published() const { return {wanted.has_right() ? 2 : 1, tracked.row_step}; }
 };
 
+/// Whether frames with these options are ever fused.
+bool may_fuse(const MethodOptions& options);
+
 /// `why_no_belief`: why the belief has no maps, if it has none. `knows_offset`: whether it has a vertical offset.
 /// `repeats`: whether the images are those of the frame before.
 Plan plan_of(const MethodOptions& options, std::optional<Unpredicted> why_no_belief, bool knows_offset,

@@ -5,8 +5,7 @@ namespace egosgm {
 
 PredictStep::PredictStep(ocl::Context& context, shared::ImageSize size, const Calibration& calibration,
                          const MethodOptions& options, const Tuning& tuning)
-    : context_(context),
-      left_right_px_(options.consistency.update_px),
+    : left_right_px_(options.consistency.update_px),
       outside_(outside_view(options.consistency)),
       checks_(options.consistency.checks_prediction && options.track_right),
       forward_warp_(context, size, calibration, options.forward_warp, range_of(options), 0, tuning.warp_band_rows),
@@ -21,13 +20,6 @@ void PredictStep::predict(const Plan& plan, const Belief& belief, Prediction& pr
   if (edge_rejection_) edge_rejection_->reject(warped.disparity, rejected.disparity, plan.tracked);
   hole_fill_.fill(edge_rejection_ ? rejected : warped, checks_ ? filled : maps, hidden, plan.tracked);
   if (checks_) consistency_.check(filled.disparity, left_right_px_, outside_, maps.disparity, plan.tracked);
-}
-
-void PredictStep::predict_nothing(Prediction& prediction) {
-  prediction.maps.disparity.fill(context_, EGOSGM_INVALID_DISPARITY);
-  prediction.maps.variance.fill(context_, 0);
-  prediction.evidence.fill(context_, 0);
-  prediction.hidden.fill(context_, 0);
 }
 
 }  // namespace egosgm

@@ -18,11 +18,8 @@ class PredictStep {
 
   /// REQUIRES: the plan has a motion.
   void predict(const Plan& plan, const Belief& belief, Prediction& prediction);
-  /// A prediction that says nothing of any pixel.
-  void predict_nothing(Prediction& prediction);
 
  private:
-  ocl::Context& context_;
   const float left_right_px_;
   const OutsideView outside_;
   const bool checks_;  // left against right

@@ -6,7 +6,7 @@ namespace egosgm {
 SearchStep::SearchStep(ocl::Context& context, shared::ImageSize size, const MethodOptions& options,
                        const Tuning& tuning)
     : search_band_(context, size, range_of(options), options.search_band, tuning.row_group) {
-  if (options.coarse_match.enabled && options.temporal && options.search == SearchMode::kBand) {
+  if (options.coarse_match.enabled && may_fuse(options) && options.search == SearchMode::kBand) {
     coarse_match_.emplace(context, size, options,
                           BandedSgm::Tile{tuning.tile_width, tuning.tile_height, tuning.block_lanes});
   }

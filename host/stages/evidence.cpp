@@ -20,7 +20,7 @@ BlockEvidence::BlockEvidence(ocl::Context& context, shared::ImageSize size)
     : evidence(context, places(size)), found(context, places(size)) {}
 
 bool Evidence::is_of(const MethodOptions& options) {
-  return options.temporal && options.evidence.enabled && Census::words(options.banded_sgm.cost) == 2;
+  return options.evidence.enabled && Census::words(options.banded_sgm.cost) == 2;
 }
 
 Evidence::Evidence(ocl::Context& context, shared::ImageSize size, const MethodOptions& options, int pixels)

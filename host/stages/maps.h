@@ -87,6 +87,14 @@ struct Prediction {
         filled(Map(context, ocl::Scratch::kOfStep1, 2 * pixel_count(size)), maps.variance),
         evidence(context, 2 * pixel_count(size)),
         hidden(context, 2 * pixel_count(size)) {}
+
+  /// Says nothing of any pixel.
+  void fill_with_nothing(ocl::Context& context) {
+    maps.disparity.fill(context, EGOSGM_INVALID_DISPARITY);
+    maps.variance.fill(context, 0);
+    evidence.fill(context, 0);
+    hidden.fill(context, 0);
+  }
 };
 
 /// The views that a stage works on, and which of their rows.

@@ -29,7 +29,7 @@ EXAMPLES = pathlib.Path(os.environ.get("EGOSGM_EXAMPLES", ""))
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
 DATA = os.environ.get("EGOSGM_DATA", "")
 WIDTH, HEIGHT, FRAMES = 320, 96, 4
-FEW_KERNELS = ("--temporal", "off", "--set", "coarse_match=false", "--paths", 4)  # soon compiled where the driver's cache is empty
+FEW_KERNELS = ("--temporal", "off", "--set", "constants.evidence.enabled=false", "--paths", 4)  # soon compiled where the driver's cache is empty
 F_SETPIPE_SZ = 1031  # fcntl has it since Python 3.10
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background ignores it, and so do programs that it starts
 

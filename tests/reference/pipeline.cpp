@@ -120,7 +120,7 @@ int Pipeline::row_step() const {
 }
 
 bool Pipeline::has_evidence() const {
-  return options_.temporal && options_.evidence.enabled && options_.banded_sgm.cost == MatchingCost::kCensus9x7;
+  return options_.evidence.enabled && options_.banded_sgm.cost == MatchingCost::kCensus9x7;
 }
 
 std::vector<std::uint8_t> Pipeline::explain(const Images& images, const Frame& frame) const {

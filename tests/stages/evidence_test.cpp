@@ -305,9 +305,6 @@ TEST(Evidence, NeedsCodesOfTwoWords) {
   EXPECT_TRUE(Evidence::is_of(method));
   method.banded_sgm.cost = MatchingCost::kSad3x3;
   EXPECT_FALSE(Evidence::is_of(method));
-  method = {};
-  method.temporal = false;
-  EXPECT_FALSE(Evidence::is_of(method));
   EXPECT_FALSE(Evidence::is_of(PipelineOptions::paper()));
 }
 
