@@ -4,12 +4,52 @@
 #include <pybind11/eigen.h>
 #include <pybind11/stl.h>
 
+#include <array>
+#include <cstring>
 #include <mutex>
 
 #include "python/arrays.h"
 #include "python/bindings.h"
+#include "python/pickling.h"
 
 namespace egosgm::python {
+
+template <int kRows, int kCols>
+struct Stored<Eigen::Matrix<double, kRows, kCols>> {
+  using Value = Eigen::Matrix<double, kRows, kCols>;
+  using Numbers = std::array<double, std::size_t{kRows} * kCols>;
+  static py::object of(const Value& value) {
+    Numbers numbers;
+    Eigen::Map<Value>(numbers.data()) = value;
+    return py::cast(numbers);
+  }
+  static Value from(const py::handle& stored) { return Eigen::Map<const Value>(stored.cast<Numbers>().data()); }
+};
+
+template <>
+struct Stored<Isometry> {
+  static py::object of(const Isometry& value) { return Stored<Eigen::Matrix4d>::of(value.matrix()); }
+  static Isometry from(const py::handle& stored) { return Isometry(Stored<Eigen::Matrix4d>::from(stored)); }
+};
+
+template <>
+struct Stored<vision::Image> {  // kU8, kF32 or kFlow
+  static py::object of(const vision::Image& value) { return array_of(value); }
+  static vision::Image from(const py::handle& stored) {
+    const auto array = stored.cast<py::array>();
+    const bool bytes = array.itemsize() == 1;
+    vision::Image image(static_cast<int>(array.shape(0)), static_cast<int>(array.shape(1)),
+                        bytes               ? vision::kU8
+                        : array.ndim() == 2 ? vision::kF32
+                                            : vision::kFlow);
+    const auto row_bytes = static_cast<std::size_t>(image.cols) * image.type.pixel_bytes();
+    for (int y = 0; y < image.rows; ++y) {
+      std::memcpy(image.row(y), static_cast<const char*>(array.data()) + y * array.strides(0), row_bytes);
+    }
+    return image;
+  }
+};
+
 namespace {
 
 using vision::LabelledObjects;
@@ -46,8 +86,11 @@ class LockedTracker {
 }  // namespace
 
 void bind_moving_objects(py::module_& module) {
-  py::class_<MovingObject>(module, "MovingObject", "A rigid surface that moves by itself.")
-      .def_readonly("id", &MovingObject::id, "1 to 255; kept while each frame finds the object.")
+  auto object = py::class_<MovingObject>(module, "MovingObject", "A rigid surface that moves by itself.");
+  pickle_members<&MovingObject::id, &MovingObject::age, &MovingObject::pixels, &MovingObject::left, &MovingObject::top,
+                 &MovingObject::right, &MovingObject::bottom, &MovingObject::centre_m, &MovingObject::velocity_m,
+                 &MovingObject::velocity_covariance_m2, &MovingObject::current_from_previous>(object);
+  object.def_readonly("id", &MovingObject::id, "1 to 255; kept while each frame finds the object.")
       .def_readonly("age", &MovingObject::age, "Pairs of frames that found it, one after the other.")
       .def_readonly("pixels", &MovingObject::pixels, "That have its label.")
       .def_property_readonly("box", &box_of<MovingObject>,
@@ -70,8 +113,9 @@ void bind_moving_objects(py::module_& module) {
                std::to_string(o.age) + ">";
       });
 
-  py::class_<LabelledObjects>(module, "LabelledObjects", "The objects of a frame.")
-      .def_readonly("moving", &LabelledObjects::moving)
+  auto objects = py::class_<LabelledObjects>(module, "LabelledObjects", "The objects of a frame.");
+  pickle_members<&LabelledObjects::moving, &LabelledObjects::labels>(objects);
+  objects.def_readonly("moving", &LabelledObjects::moving)
       .def_property_readonly(
           "labels", [](const LabelledObjects& f) { return array_of(f.labels); },
           "The object's id at each pixel of the left view, or 0.");
@@ -83,6 +127,8 @@ void bind_moving_objects(py::module_& module) {
                            {"next_disparity", &SceneFlow::next_disparity},
                            {"flow", &SceneFlow::flow},
                            {"labels", &SceneFlow::labels}});
+  pickle_members<&SceneFlow::disparity, &SceneFlow::next_disparity, &SceneFlow::flow, &SceneFlow::labels,
+                 &SceneFlow::moving, &SceneFlow::camera>(scene_flow);
   scene_flow.def_readonly("moving", &SceneFlow::moving, "With boxes, centres and velocities in the earlier frame.")
       .def_readonly("camera", &SceneFlow::camera, "The camera's motion from the earlier frame to the newest one.");
 

@@ -276,6 +276,21 @@ def test_results_leave_a_process(copied, street_folder):
             np.testing.assert_array_equal(taken.motion.current_from_previous, frame.motion.current_from_previous)
 
 
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda value: pickle.loads(pickle.dumps(value))])
+def test_objects_and_scene_flow_leave_a_process(copied):
+    street = egosgm.SyntheticSequence(width=480, height=180, frames=3, seed=3, moving_object=True, supersampling=1)
+    pairs = [(frame.left, frame.right) for frame in map(street.render, range(3))]
+    *_, frame = egosgm.run(pairs, street.calibration, objects=True, disparities=64, paths=4)
+    assert frame.objects.moving
+    taken = copied(frame)
+    np.testing.assert_array_equal(taken.objects.labels, frame.objects.labels)
+    for name in ("disparity", "next_disparity", "flow", "labels"):
+        np.testing.assert_array_equal(getattr(taken.scene_flow, name), getattr(frame.scene_flow, name))
+    np.testing.assert_array_equal(taken.scene_flow.camera.current_from_previous, frame.scene_flow.camera.current_from_previous)
+    for now, before in ((taken.objects, frame.objects), (taken.scene_flow, frame.scene_flow)):
+        assert [repr(fields_of(copied(o))) for o in now.moving] == [repr(fields_of(o)) for o in before.moving]
+
+
 def test_repr_says_what_it_is(shared_pipeline, street, frames):
     result = shared_pipeline.process(frames[0].left, frames[0].right, outputs="disparity")
     assert repr(result) == "<Frame of disparity>"
