@@ -51,7 +51,7 @@ class Descriptor {
 }
 
 [[noreturn]] void fail_writing(const std::filesystem::path& file, int error) {
-  const char* remedy = error == ENOENT ? "; its folder is gone: choose one that stays"
+  const char* remedy = error == ENOENT ? "; its folder is not there: make it, or choose another"
                                        : "; free some space or choose a folder that can be written";
   throw IoError(file.string() + ": cannot be written: " + reason(error) + remedy);
 }
