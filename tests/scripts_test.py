@@ -198,6 +198,14 @@ class Scripts(unittest.TestCase):
         self.assertEqual((done.returncode, done.stdout), (2, ""))
         self.assertIn(f"try-arm: {root}: an overlay of file systems takes no path with a blank", done.stderr)
 
+    def test_a_link_to_the_scripts_leads_to_the_project(self):
+        link = pathlib.Path(self.folder.name, "link")
+        link.symlink_to(SCRIPTS)
+        self.assertIn(" census ", self.called(link / "check", "nope").stderr)
+        for script in self.scripts:
+            for line in script.read_text().splitlines():
+                self.assertNotRegex(line, r'\bcd "\$(\(dirname "\$0"\)/\.\.|folder)"', script.name)
+
     def test_the_lane_of_threads_names_tests_that_there_are(self):
         names = re.search(r"^threaded='\^\((.*)\)'$", (SCRIPTS / "lanes").read_text(), re.MULTILINE)[1]
         outer, programs = re.fullmatch(r"(.*)\|program\\\.\((.*)\)\$", names).groups()
