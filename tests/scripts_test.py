@@ -72,6 +72,13 @@ class Scripts(unittest.TestCase):
                               ({"disparity": ["a", "b", "c", "e"], "pfm": ["d"], "right": ["f"]}, ["default: disparity of frame 3", "default: right of frame 0"])):
             self.assertEqual(differences(before, {"images": before["images"], "runs": {"default": change, "new": {"pfm": ["g"]}}}), named)
 
+    def test_same_bits_looks_for_its_files_before_it_runs(self):
+        for words, named in ((("--check", "nowhere.json", "--program", "true"), "nowhere.json: there is no such file"),
+                             (("--record", f"{self.folder.name}/now.json", "--program", "nowhere/egosgm"), "nowhere/egosgm: there is no such program")):
+            done = self.called(SCRIPTS / "same-bits", *words)
+            self.assertEqual((done.returncode, done.stdout, done.stderr.count("\n")), (2, "", 1), done.stderr)
+            self.assertIn(named, done.stderr)
+
     def test_same_bits_begins_no_run_after_its_time(self):
         with unittest.mock.patch.object(sys, "path", [str(SCRIPTS), *sys.path]):
             same_bits = runpy.run_path(str(SCRIPTS / "same-bits"))
