@@ -131,6 +131,8 @@ class ManySequences(ProgramTest):
             self.assertEqual(file.read_bytes(), (out / "street-1/disparity" / file.name).read_bytes(), file.name)
         self.assertEqual(len(list(out.glob("street-1/disparity/*"))), 2)
         self.assertIn("has no line 4", self.run_line(self.SEQUENCES, out, code=2))
+        for index in ("", "x", "-1"):  # as of a job that is no array's
+            self.assertIn("give the number of a line", self.run_line(index, out, code=2))
         whole = self.list.read_text()
         try:
             for text, said in (("# none\n", "has no line 0"), (f"name '{self.folder}/s 1' --set \"p1=5\n", "a quote without an end")):
