@@ -85,3 +85,10 @@ for file in png.h pngconf.h pnglibconf.h jpeglib.h jmorecfg.h jerror.h jconfig.h
   cp -L "$(find "$libraries/include" -maxdepth 2 -name "$file" -print -quit)" "$root/prefix/include/"
 done
 cp -r /usr/include/CL -t "$root/prefix/include"
+# What is linked in, or lies beside it, asks for its notice in every copy. The loader is ocl-icd's, too.
+rm -rf "$root/licenses"
+mkdir "$root/licenses"
+for notice in "$libraries"/share/doc/{libpng,libjpeg*,zlib1g,libisal,ocl-icd-opencl,libfmt,libeigen3,nlohmann-json3,libcli11}-dev/copyright; do
+  package=${notice%/copyright}
+  cp -L "$notice" "$root/licenses/${package##*/}"
+done

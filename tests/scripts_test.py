@@ -213,6 +213,21 @@ class Scripts(unittest.TestCase):
             for line in script.read_text().splitlines():
                 self.assertNotRegex(line, r'\bcd "\$(\(dirname "\$0"\)/\.\.|folder)"', script.name)
 
+    def test_the_notice_of_each_library_goes_with_a_wheel_and_a_pack(self):
+        script = (SCRIPTS / "old_glibc.sh").read_text()
+        notices = "set -eu\n" + script[script.index("mkdir \"$root/licenses\""):]
+        root, packages = pathlib.Path(self.folder.name, "a b, c"), ["zlib1g-dev", "libjpeg62-turbo-dev"]
+        for package in re.search(r"share/doc/\{(.*)\}-dev", notices)[1].replace("*", "-turbo8").split(","):
+            packages.append(f"{package}-dev")
+        for package in packages:
+            (root / "share/doc" / package).mkdir(parents=True, exist_ok=True)
+            (root / "share/doc" / package / "copyright").write_text(f"of {package}")
+        subprocess.run(["bash", "-c", notices], env=dict(os.environ, root=str(root), libraries=str(root)), check=True)
+        self.assertEqual({file.name: file.read_text() for file in (root / "licenses").iterdir()}, {package: f"of {package}" for package in packages})
+        self.assertLess({"libpng-dev", "libisal-dev", "zlib1g-dev", "ocl-icd-opencl-dev"}, set(packages))
+        for name in ("build-wheel", "bench-device"):
+            self.assertIn("/licenses", (SCRIPTS / name).read_text())
+
     def test_the_lane_of_threads_names_tests_that_there_are(self):
         names = re.search(r"^threaded='\^\((.*)\)'$", (SCRIPTS / "lanes").read_text(), re.MULTILINE)[1]
         outer, programs = re.fullmatch(r"(.*)\|program\\\.\((.*)\)\$", names).groups()
