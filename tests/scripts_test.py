@@ -265,6 +265,12 @@ class InAnyOrder(unittest.TestCase):
                               capture_output=True, text=True)
         self.assertEqual(done.returncode, 0, done.stderr)
 
+    def test_a_wheel_installs_its_package_alone(self):
+        done = subprocess.run(["cmake", "-S", self.checkout, "-B", self.checkout / "build-python", "-DSKBUILD=2", "-DEGOSGM_VISION=OFF", "-DEGOSGM_TESTS=OFF",
+                               "-DEGOSGM_BENCH=OFF"], env=self.environment, capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertNotIn("share/doc", (self.checkout / "build-python/cmake_install.cmake").read_text())
+
     def configured(self, script, *arguments):
         """What the cache says after a call of a script that came as far as building."""
         done = subprocess.run([self.checkout / "scripts" / script, *arguments], env=self.environment, stdin=subprocess.DEVNULL, capture_output=True, text=True)
