@@ -20,7 +20,7 @@ struct Matcher {
   shared::ImageSize size;
   shared::DisparityRange range;
   BandedSgmOptions options;
-  ocl::Context context{testing::any_device()};
+  ocl::Context& context = testing::shared_context();
   BandedSgm sgm{context, size, range, options};
   ocl::Buffer<cl_uint> codes{context, code_words()};
   ocl::Buffer<cl_uchar> penalties{context, 8 * pixel_count(size)};

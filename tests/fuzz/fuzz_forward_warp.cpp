@@ -59,7 +59,7 @@ void run(std::string_view input) {
   const testing::HostMaps expected =
       reference::forward_warp(kSize, range, disparity_motion(calibration, motion, EGOSGM_LEFT),
                               disparity_motion(calibration, motion, EGOSGM_RIGHT), kProcessNoisePx2, belief);
-  static ocl::Context context(testing::any_device());
+  ocl::Context& context = testing::shared_context();
   const StereoMaps on_device = testing::upload(context, kSize, belief);
   FlagMap evidence(context, belief.evidence.size()), moved(context, belief.evidence.size());
   evidence.write(context, belief.evidence);

@@ -43,7 +43,7 @@ std::vector<cl_uchar> slanted_pair(double texture, unsigned seed) {
 /// Matches frame after frame in bands of a half-width around what the frame before gave, the first in bands around the
 /// surface; half-width 0: in the full range. The mean signed error of the last one [px], of what lies near the surface.
 double bias(double texture, float half_width_px, int frames, Scheduling scheduling) {
-  ocl::Context context(testing::any_device());
+  ocl::Context& context = testing::shared_context();
   BandedSgmOptions options;
   options.scheduling = scheduling;
   testing::HostMaps surface = testing::empty_maps(kSize);

@@ -102,7 +102,7 @@ Match match(const Case& c, int max_memory_mib = 0) {
   for (std::size_t i = 0; i < 2 * pixel_count(c.size); ++i)
     m.grey.push_back(static_cast<std::uint16_t>(random() & 127));
 
-  ocl::Context context(testing::any_device());
+  ocl::Context& context = testing::shared_context();
   const int padding = BandedSgm::code_padding(c.range);
   m.options = {.cost = c.cost, .paths = c.paths, .scheduling = c.scheduling, .max_memory_mib = max_memory_mib};
   SearchBands bands(context, c.size, c.range);
@@ -217,7 +217,7 @@ TEST(BandedSgmStripes, EqualTheReferenceOfEach) {
 }
 
 TEST(BandedSgmStripes, OfPathsAreThoseOfEveryDevice) {
-  ocl::Context context(testing::any_device());
+  ocl::Context& context = testing::shared_context();
   const BandedSgmOptions options{.scheduling = Scheduling::kPaths, .max_memory_mib = 18};
   EXPECT_EQ(BandedSgm(context, {200, 224}, {0, 64}, options).stripes().front().rows, 110);
 }

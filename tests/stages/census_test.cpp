@@ -40,7 +40,7 @@ TEST_P(CensusTest, EqualsReference) {
     for (std::size_t i = 0; i < pixel_count(size); ++i) view.push_back(static_cast<std::uint16_t>(grey(random)));
   }
 
-  ocl::Context context(testing::any_device());
+  ocl::Context& context = testing::shared_context();
   Census census(context, size, type, cost, padding, pixels);
   ocl::Buffer<cl_uint> codes(context, Census::words(cost, size, padding));
   const auto images = both(context, views, type);
@@ -85,7 +85,7 @@ TEST_P(AlikeTest, EqualsReference) {
                                                             : random() % 65536));
     }
   }
-  ocl::Context context(testing::any_device());
+  ocl::Context& context = testing::shared_context();
   const int padding = 19;
   Census census(context, size, PixelType::kU16, MatchingCost::kCensus9x7, padding, pixels);
   ocl::Buffer<cl_uint> codes(context, Census::words(MatchingCost::kCensus9x7, size, padding));

@@ -30,7 +30,7 @@ std::vector<int> blotches(shared::ImageSize size, int disparity, int bits) {
 
 std::vector<float> run(shared::ImageSize size, const MethodOptions& options, const std::vector<int>& images,
                        PixelType type) {
-  ocl::Context context(testing::any_device());
+  ocl::Context& context = testing::shared_context();
   CoarseMatch stage(context, size, options);
   Map found(context, 2 * pixel_count(CoarseMatch::coarse_size(size)));
   stage.prepare(type);

@@ -16,7 +16,7 @@ using testing::kNone;
 
 testing::HostMaps check(shared::ImageSize size, float max_difference_px, const testing::HostMaps& maps,
                         OutsideView outside = OutsideView::kDrop, int pixels = 0, Views views = Views::kBoth) {
-  ocl::Context context(testing::any_device());
+  ocl::Context& context = testing::shared_context();
   ConsistencyCheck stage(context, size, pixels);
   Map kept = testing::upload(context, size, testing::earlier_maps(size)).disparity;
   stage.check(testing::upload(context, size, maps).disparity, max_difference_px, outside, kept, views);

@@ -36,7 +36,7 @@ struct OnDevice {
 
 std::vector<cl_uchar> marks_of(shared::ImageSize size, const View& last, const View& current, const Motion& motion,
                                int pixels = 0) {
-  ocl::Context context(testing::any_device());
+  ocl::Context& context = testing::shared_context();
   DynamicMap stage(context, size, kCalibration, DynamicMap::levels(context, size), pixels);
   const OnDevice first(context, size, last, stage), second(context, size, current, stage);
   ocl::Buffer<cl_uchar> marks = testing::on_device<cl_uchar>(context, pixel_count(size), 99);

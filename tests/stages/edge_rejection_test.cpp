@@ -11,7 +11,7 @@ using testing::kNone;
 
 testing::HostMaps reject(shared::ImageSize size, float max_jump_px, const testing::HostMaps& maps, int pixels = 0,
                          Views views = Views::kBoth) {
-  ocl::Context context(testing::any_device());
+  ocl::Context& context = testing::shared_context();
   EdgeRejection stage(context, size, {.max_jump_px = max_jump_px}, pixels);
   Map kept = testing::upload(context, size, testing::earlier_maps(size)).disparity;
   stage.reject(testing::upload(context, size, maps).disparity, kept, views);

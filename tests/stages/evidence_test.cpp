@@ -78,7 +78,7 @@ Images shifted(Images images, int disparity) {
 reference::BlockEvidence evidence_of(const Images& images, bool has_coarse, const std::vector<float>& found,
                                      const testing::HostMaps& predicted, const testing::HostMaps& measured, int pixels,
                                      Views views = Views::kBoth) {
-  ocl::Context context(testing::any_device());
+  ocl::Context& context = testing::shared_context();
   const shared::ImageSize size = images.size, quarter = images.coarse_size();
   const int padding = BandedSgm::code_padding(range_of(options()));
   const reference::ViewCodes of_views = images.codes();
@@ -245,7 +245,7 @@ TEST(Evidence, GivesOutWhatHasMuchOrIsSupported) {
   }
   for (const int pixels : {1, 16}) {
     for (const Views tracked : {Views::kBoth, Views::kLeft}) {
-      ocl::Context context(testing::any_device());
+      ocl::Context& context = testing::shared_context();
       const StereoMaps on_device = testing::upload(context, kSmall, maps);
       FlagMap evidence = testing::on_device(context, maps.evidence);
       Map published = testing::upload(context, kSmall, testing::random_maps(kSmall, 0, 9, 0.2, 9)).disparity;
@@ -273,7 +273,7 @@ TEST(Evidence, PublishesWhatHasLittleWithinASurface) {
     };
     set(x, y, d, of_pixel);
     for (const Place& place : supporters) set(x + place.dx, y + place.dy, 20, of_them);
-    ocl::Context context(testing::any_device());
+    ocl::Context& context = testing::shared_context();
     FlagMap evidence = testing::on_device(context, maps.evidence);
     Map published(context, maps.disparity.size());
     Evidence(context, kSurface, options())

@@ -22,7 +22,7 @@ const Calibration kCalibration{.fx = 100, .fy = 100, .cx = 50, .cy = 30, .baseli
 testing::HostMaps warp(shared::ImageSize size, const Calibration& calibration, shared::DisparityRange range,
                        float process_noise_px2, const testing::HostMaps& belief, const Motion& motion, int pixels = 0,
                        Views views = Views::kBoth) {
-  ocl::Context context(testing::any_device());
+  ocl::Context& context = testing::shared_context();
   ForwardWarp stage(context, size, calibration, {.process_noise_px2 = process_noise_px2}, range, pixels);
   const StereoMaps in = testing::upload(context, size, belief);
   StereoMaps out = testing::upload(context, size, testing::earlier_maps(size));

@@ -15,7 +15,7 @@ using testing::kNone;
 
 testing::HostMaps fill(shared::ImageSize size, float max_difference_px, const testing::HostMaps& maps, int pixels = 0,
                        Views views = Views::kBoth) {
-  ocl::Context context(testing::any_device());
+  ocl::Context& context = testing::shared_context();
   HoleFill stage(context, size, {.max_difference_px = max_difference_px}, pixels);
   const StereoMaps in = testing::upload(context, size, testing::with_marks(maps));
   StereoMaps out = testing::upload(context, size, testing::earlier_maps(size));

@@ -16,7 +16,7 @@ using testing::kNone;
 testing::HostMaps update(shared::ImageSize size, const KalmanUpdateOptions& options, const testing::HostMaps& predicted,
                          const testing::HostMaps& measured, int pixels = 0, Views views = Views::kBoth,
                          const reference::FrameEvidence* evidence = nullptr) {
-  ocl::Context context(testing::any_device());
+  ocl::Context& context = testing::shared_context();
   KalmanUpdate stage(context, size, options, pixels);
   const StereoMaps prediction = testing::upload(context, size, predicted);
   const StereoMaps measurement = testing::upload(context, size, measured);

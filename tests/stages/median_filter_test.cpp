@@ -15,7 +15,7 @@ using testing::kNone;
 
 testing::HostMaps filter(shared::ImageSize size, const testing::HostMaps& in, int pixels = 0,
                          Views views = Views::kBoth) {
-  ocl::Context context(testing::any_device());
+  ocl::Context& context = testing::shared_context();
   MedianFilter stage(context, size, pixels);
   StereoMaps maps = testing::upload(context, size, in);
   Map filtered = testing::upload(context, size, testing::earlier_maps(size)).disparity;
@@ -39,7 +39,7 @@ EGOSGM_TEST_AT_ALL_SIZES(MedianFilterTest);
 
 TEST_P(MedianFilterTest, EqualsReference) {
   const shared::ImageSize size = GetParam();
-  ocl::Context context(testing::any_device());
+  ocl::Context& context = testing::shared_context();
   for (const double holes : {0.0, 0.3, 1.0}) {
     const testing::HostMaps maps = testing::random_maps(size, -40, 90, holes, 7);
     const testing::HostMaps before = testing::masked(

@@ -20,7 +20,7 @@ constexpr float kUntouched = -77;
 std::vector<float> output_variance(shared::ImageSize size, const std::vector<float>& output,
                                    const testing::HostMaps& in, const testing::HostMaps& measured_in,
                                    const OutputVarianceOptions& options, int pixels = 0, Views views = Views::kBoth) {
-  ocl::Context context(testing::any_device());
+  ocl::Context& context = testing::shared_context();
   OutputVariance stage(context, size, options, pixels);
   const StereoMaps maps = testing::upload(context, size, in);
   StereoMaps measured = testing::upload(context, size, measured_in);

@@ -31,7 +31,7 @@ FrameImages upload_images(ocl::Context& context, shared::ImageSize size, const r
 /// Fills in the codes of the inputs.
 std::vector<cl_uchar> reasons_of(shared::ImageSize size, const MethodOptions& options, reference::ReasonInputs& inputs,
                                  int pixels = 0) {
-  ocl::Context context(testing::any_device());
+  ocl::Context& context = testing::shared_context();
   const FrameImages images = upload_images(context, size, inputs);
   inputs.code_padding = BandedSgm::code_padding(range_of(options));
   Census census(context, size, images.type, options.banded_sgm.cost, inputs.code_padding);

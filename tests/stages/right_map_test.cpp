@@ -18,7 +18,7 @@ using Row = std::vector<float>;
 testing::HostMaps right_map(shared::ImageSize size, shared::DisparityRange range, float max_difference_px,
                             const testing::HostMaps& measured, const testing::HostMaps& maps, int pixels,
                             bool makes_variance = true) {
-  ocl::Context context(testing::any_device());
+  ocl::Context& context = testing::shared_context();
   RightMap right_map(context, size, range, pixels);
   // What an earlier frame had must not shine through.
   StereoMaps earlier = testing::upload(context, size, testing::random_maps(size, 0, 12, 0, 99));

@@ -12,7 +12,7 @@ namespace {
 using testing::kNone;
 
 testing::HostMaps interpolate(shared::ImageSize size, int step, const testing::HostMaps& maps, int pixels = 0) {
-  ocl::Context context(testing::any_device());
+  ocl::Context& context = testing::shared_context();
   RowInterpolation stage(context, size, pixels);
   StereoMaps on_device = testing::upload(context, size, maps);
   stage.interpolate(on_device.disparity, on_device.variance, {2, step});

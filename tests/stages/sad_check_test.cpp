@@ -16,7 +16,7 @@ using testing::same_bits;
 
 std::vector<float> run(shared::ImageSize size, PixelType type, const SadCheckOptions& options,
                        const std::vector<int>& images, const HostMaps& maps, int pixels = 0) {
-  ocl::Context context(testing::any_device());
+  ocl::Context& context = testing::shared_context();
   SadCheck stage(context, size, type, options, pixels);
   Map checked = testing::upload(context, size, maps).disparity;
   stage.check(testing::images_of(context, images, type).pixels, checked);

@@ -31,7 +31,7 @@ reference::SearchBands read(ocl::Context& context, const SearchBands& bands) {
 reference::SearchBands run(shared::ImageSize size, shared::DisparityRange range, const SearchBandOptions& options,
                            const HostMaps& maps, int row_group = 0, const std::vector<float>& coarse = {},
                            Views views = Views::kBoth) {
-  ocl::Context context(testing::any_device());
+  ocl::Context& context = testing::shared_context();
   SearchBand stage(context, size, range, options, row_group);
   StereoMaps predicted(context, size);
   predicted.disparity.write(context, maps.disparity);
@@ -87,7 +87,7 @@ TEST_P(SearchBandTest, EqualsReferenceWithEverySecondRow) {
 TEST_P(SearchBandTest, FullRangeEqualsReference) {
   const shared::ImageSize size = GetParam();
   for (const shared::DisparityRange range : kRanges) {
-    ocl::Context context(testing::any_device());
+    ocl::Context& context = testing::shared_context();
     SearchBands bands(context, size, range);
     EXPECT_TRUE(same_bits(bands.bands.read(context), reference::full_range(size, range).bands, size));
     EXPECT_TRUE(same_bits(bands.cell_offsets.read(context), reference::full_range(size, range).cell_offsets, size));
@@ -99,7 +99,7 @@ TEST_P(SearchBandTest, FullRangeEqualsReference) {
 
 TEST_P(SearchBandTest, SearchesTheLeftViewAlone) {
   const shared::ImageSize size = GetParam(), quarter{(size.width + 3) / 4, (size.height + 3) / 4};
-  ocl::Context context(testing::any_device());
+  ocl::Context& context = testing::shared_context();
   const StereoMaps predicted = testing::upload(context, size, testing::random_maps(size, -5, 122, 0.6, 40));
   const StereoMaps coarse = testing::upload(context, quarter, testing::random_maps(quarter, -1, 30, 0.3, 42));
   const StereoMaps earlier = testing::upload(context, size, testing::random_maps(size, -5, 122, 0.6, 43));
@@ -248,7 +248,7 @@ TEST(SearchBand, ReportsAllThatWasMatched) {
   const shared::ImageSize size{32, 8};
   auto maps = testing::empty_maps(size);
   std::fill_n(maps.disparity.begin(), pixel_count(size), 50.0f);
-  ocl::Context context(testing::any_device());
+  ocl::Context& context = testing::shared_context();
   SearchBand stage(context, size, {0, 100}, {.sigmas = 0, .min_half_width_px = 2});
   FrameTransfer transfer(context, size, {0, 100});
   const StereoMaps predicted = testing::upload(context, size, maps);

@@ -14,7 +14,7 @@ using Row = std::vector<float>;
 
 Row run(shared::ImageSize size, const SpeckleRemovalOptions& options, const HostMaps& maps, int strip_rows = 0,
         int row_group = 0, Views views = Views::kBoth) {
-  ocl::Context context(testing::any_device());
+  ocl::Context& context = testing::shared_context();
   SpeckleRemoval stage(context, size, options, strip_rows, row_group);
   Map kept = testing::on_device(context, maps.disparity);
   stage.remove(kept, views);

@@ -16,7 +16,7 @@ constexpr cl_uchar kUntouched = 7;
 
 std::vector<std::uint8_t> penalties(shared::ImageSize size, const std::vector<std::uint16_t>& grey, PixelType type,
                                     const BandedSgmOptions& options, int pixels = 0, Views views = Views::kBoth) {
-  ocl::Context context(testing::any_device());
+  ocl::Context& context = testing::shared_context();
   StepPenalties penalties(context, size, type, options, pixels);
   auto steps = testing::on_device(context, StepPenalties::bytes(size), kUntouched);
   penalties.compute(testing::images_of(context, grey, type).pixels, steps, views);

@@ -81,7 +81,7 @@ reference::VerticalOffset read(ocl::Context& context, const VerticalOffset& on_d
 
 /// What a pipeline does, without its matcher: two estimates in the first frame, then one a frame.
 struct Video {
-  ocl::Context context{testing::any_device()};
+  ocl::Context& context = testing::shared_context();
   shared::ImageSize size;
   VerticalAlignment alignment;
   VerticalOffset offset{context};
@@ -126,7 +126,7 @@ TEST_P(VerticalAlignmentTest, EqualsReference) {
   const testing::HostMaps holes = testing::random_maps(size, -20, 30, 0.3, 23);
   for (std::size_t i = 0; i < scene.measured.disparity.size(); i += 3) scene.measured.disparity[i] = holes.disparity[i];
 
-  ocl::Context context(testing::any_device());
+  ocl::Context& context = testing::shared_context();
   VerticalAlignment alignment(context, size, type, {.gain = 0.3f}, {context, size}, row_group);
   const FrameImages images = upload(context, scene);
   const StereoMaps measured = testing::upload(context, size, scene.measured);

@@ -17,7 +17,7 @@ using testing::kNone;
 
 HostMaps filter(shared::ImageSize size, PixelType type, const std::vector<std::uint16_t>& images, const HostMaps& in,
                 int pixels = 0, Views views = Views::kBoth) {
-  ocl::Context context(testing::any_device());
+  ocl::Context& context = testing::shared_context();
   WeightedMedian stage(context, size, type, pixels);
   StereoMaps maps = testing::upload(context, size, in);
   Map filtered = testing::upload(context, size, testing::earlier_maps(size)).disparity;
@@ -29,7 +29,7 @@ EGOSGM_TEST_AT_ALL_SIZES(WeightedMedianTest);
 
 TEST_P(WeightedMedianTest, EqualsReference) {
   const shared::ImageSize size = GetParam();
-  ocl::Context context(testing::any_device());
+  ocl::Context& context = testing::shared_context();
   std::mt19937 random(7);
   for (const PixelType type : {PixelType::kU8, PixelType::kU16}) {
     // Some 30 of 100 grey values apart: most neighbours vote, some do not. The low byte of 16 bits does not count.

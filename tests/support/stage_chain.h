@@ -118,7 +118,7 @@ class StageChain {
 
   const MethodOptions options_;
   const shared::ImageSize size_;
-  ocl::Context context_{any_device()};
+  ocl::Context& context_ = shared_context();
   Method method_;
   FrameTransfer transfer_;
   Belief before_, after_;
