@@ -138,8 +138,9 @@ Command add_compile(CLI::App& program) {
   output.add_flag("--il", arguments->spirv,
                   "SPIR-V in place of binaries: for every device of the type that takes it, whatever its driver. Needs "
                   "clang and llvm-spirv");
-  output.add("--clang", arguments->clang, "NAME", "the compiler for --il [clang]");
-  output.add("--llvm-spirv", arguments->translator, "NAME", "the translator for --il, of clang's version [llvm-spirv]");
+  output.add("--clang", arguments->clang, "NAME", "the compiler for --il [clang]")->needs("--il");
+  output.add("--llvm-spirv", arguments->translator, "NAME", "the translator for --il, of clang's version [llvm-spirv]")
+      ->needs("--il");
   arguments->method.add_to(*command);
   add_device_option(*command, "--device", arguments->device);
   return {command, [arguments] { return compile(*arguments); }};

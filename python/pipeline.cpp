@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <deque>
 #include <mutex>
+#include <variant>
 
 #include "egosgm/named_options.h"
 #include "host/frame_outputs.h"
@@ -180,14 +181,15 @@ class LockedPipeline {
 };
 
 std::unique_ptr<LockedPipeline> make_pipeline(const Calibration& calibration, int width, int height,
-                                              const std::string& device, const std::string& preset,
+                                              const std::variant<std::string, int>& device, const std::string& preset,
                                               const std::string& cache, const py::kwargs& values) {
+  const int* number = std::get_if<int>(&device);
+  const std::string name = number ? std::to_string(*number) : std::get<std::string>(device);
   PipelineOptions options = options_of_preset(preset);
   set_options(options, values);
   options.validate();
   const py::gil_scoped_release other_threads_run;
-  return std::make_unique<LockedPipeline>(calibration, width, height, options,
-                                          Device::select(device).with_cache(cache));
+  return std::make_unique<LockedPipeline>(calibration, width, height, options, Device::select(name).with_cache(cache));
 }
 
 py::list stages_of(const FrameReport& report) {

@@ -80,7 +80,7 @@ class Frame(FrameMaps):
     report: FrameReport
 
 class Pipeline:
-    def __init__(self, calibration: Calibration, width: int, height: int, *, device: str = "", preset: str = "default",
+    def __init__(self, calibration: Calibration, width: int, height: int, *, device: Union[str, int] = "", preset: str = "default",
                  cache: str = "", **options: Unpack[PipelineOptions]) -> None: ...
     def process(self, left: NDArray[Any], right: NDArray[Any], motion: Union[Motion, ArrayLike, None] = None,
                 outputs: Union[str, Sequence[str], dict[str, NDArray[Any]]] = ("disparity", "variance")) -> Frame: ...

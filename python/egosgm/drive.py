@@ -139,8 +139,7 @@ class StereoVideo:
         self.calibration = self._calibration_from(source, calibration)
         if not isinstance(lag, (int, np.integer)) or lag not in (0, 1):
             raise _egosgm.InvalidArgument(f"lag={lag!r}: choose 1, the device works while the next pair comes, or 0, a frame comes before the next pair is asked for")
-        device = {"device": str(options["device"])} if isinstance(options.get("device"), (int, np.integer)) else {}  # a number names one, too
-        self._source, self._outputs, self._lag, self._options = source, outputs, int(lag), {**options, **device}
+        self._source, self._outputs, self._lag, self._options = source, outputs, int(lag), options
         self._bar = _bar(progress)
         self._odometry_options = self._odometry_from(odometry, motion, objects)
         self._objects = bool(objects)

@@ -23,7 +23,7 @@ class Matcher:
         end = self.min_disparity + self.disparities
         if not (self.min_disparity > -2047 and end <= 2047):
             raise _egosgm.InvalidArgument(f"disparities {self.min_disparity} to {end - 1} do not fit into 16 bits with 16 steps a pixel; Pipeline gives float")
-        self._options = {"device": str(device), **options}
+        self._options = {"device": device, **options}
         self._pipeline: Optional[_egosgm.Pipeline] = None
         self._made_for: Tuple[Any, ...] = ()
 

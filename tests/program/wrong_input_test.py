@@ -24,6 +24,7 @@ COMMANDS = (
     ("rnu {street}", 'no command "rnu": see `egosgm --help`'), ("rnu --help", "rnu", "egosgm --help"), ("--versoin", "--versoin", "egosgm --help"),
     ("run --odometry {street}t --out {never}", "{street}t"),
     ("eval --estimate={street}t/truth/left_disp_occ/000000.png --truth {street}", "{street}t"),
+    ("compile --out {never} --clang clang", "--clang", "--il"), ("compile --out {never} --llvm-spirv llvm-spirv", "--llvm-spirv", "--il"),
     ("run --out {never} -- {street} more", "more than one input", "and more"),
     ("run --odometry {street} --out ''", "--out", "is empty"),
     ("run {street} --out --quiet", "--out: its value is missing", "--quiet is an option"),

@@ -117,6 +117,12 @@ def test_what_is_missing_is_named(run):
     assert not (run / "cloud.ply").exists()
 
 
+def test_a_name_of_another_format_is_refused(run):
+    expect_refused("cloud.pcd: a cloud is a PLY file", lambda: cloud.main([str(run), "--out", str(run / "cloud.pcd")]))
+    assert not (run / "cloud.pcd").exists()
+    assert cloud.main([str(run), "--out", str(run / "CLOUD.PLY")]) == 0
+
+
 @pytest.mark.parametrize("entry", [{"frame": 0, "left": None}, {"frame": 0, "left": 5}, {"frame": 0, "name": [1], "left": "left0.png"}, {"frame": "a", "left": "b"}, 3])
 def test_an_edited_report_is_refused(run, entry):
     report = json.loads((run / "report.json").read_text())

@@ -89,7 +89,7 @@ def test_options_have_the_librarys_names_and_defaults(street):
     for name, value in defaults.items():
         assert shown[name.replace(".", "__")].default == value
         assert name.replace(".", "__") in egosgm.Pipeline.__doc__
-    pipeline = egosgm.Pipeline(street.calibration, WIDTH, HEIGHT, preset="paper", disparities=np.int64(32), temporal=False,
+    pipeline = egosgm.Pipeline(street.calibration, WIDTH, HEIGHT, preset="paper", disparities=np.int64(32), temporal=False, device=0,
                                p1=7, p2=97, search_sigmas=np.float32(2.7), cost="sad3x3")
     changed = {"disparities": 32, "temporal": False, "p1": 7, "p2": 97, "cost": "sad3x3"}
     options = pipeline.options

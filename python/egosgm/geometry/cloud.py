@@ -122,6 +122,8 @@ def main(arguments: Sequence[str]) -> int:
     for name in ("voxel", "cloud_sigma", "max_depth", "least_frames"):
         if not getattr(given, name) > 0:
             raise _egosgm.InvalidArgument(f"--{name.replace('_', '-')} {getattr(given, name)}: choose a number above 0")
+    if given.out and pathlib.Path(given.out).suffix.lower() not in ("", ".ply"):
+        raise _egosgm.InvalidArgument(f"--out {given.out}: a cloud is a PLY file: give a name that ends in .ply")
     folder = pathlib.Path(given.run)
     calibration, frames, poses, lost = _frames_of(folder)
     file = pathlib.Path(given.out) if given.out else folder / "cloud.ply"
