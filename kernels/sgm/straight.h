@@ -51,12 +51,12 @@ typedef struct {
   ulong2 same, below, above;
 } Before;
 
-// A chunk so many lanes further up.
+// A chunk so many lanes further up. By halves of the way, as a shift by all bits is undefined; branches would be
+// mispredicted.
 static inline ulong2 moved(const ulong2 chunk, const int lanes) {
-  const ulong2 left = ~chunk;  // of what is absent, nothing
-  const ulong2 up = lanes < EGOSGM_LANES ? left >> (ulong2)((ulong)(8 * lanes)) : (ulong2)(0),
-               down = lanes > -EGOSGM_LANES ? left << (ulong2)((ulong)(-8 * lanes)) : (ulong2)(0);
-  return ~(lanes >= 0 ? up : down);
+  const ulong2 up = (ulong2)((ulong)(4 * clamp(lanes, 0, EGOSGM_LANES))),
+               down = (ulong2)((ulong)(4 * clamp(-lanes, 0, EGOSGM_LANES)));
+  return ~(~chunk >> up >> up << down << down);  // of what is absent, nothing
 }
 
 // `lanes`: how far the pixel's origin lies above that of the one before.
