@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <functional>
 #include <memory>
 #include <string>
 
+#include "apps/cli_names.h"
 #include "apps/frame_sink.h"
 #include "apps/sequence_arguments.h"
 

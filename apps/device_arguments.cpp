@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/device_arguments.h"
 
+#include <CLI/App.hpp>
 #include <map>
 #include <utility>
 

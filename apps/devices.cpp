@@ -2,6 +2,7 @@
 #include <fmt/core.h>
 #include <fmt/ranges.h>
 
+#include <CLI/App.hpp>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 

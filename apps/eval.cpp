@@ -2,6 +2,7 @@
 #include <fmt/core.h>
 #include <unistd.h>
 
+#include <CLI/App.hpp>
 #include <cmath>
 #include <map>
 #include <memory>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/core.h>
 
+#include <CLI/App.hpp>
 #include <filesystem>
 #include <memory>
 #include <optional>

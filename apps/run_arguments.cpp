@@ -3,6 +3,7 @@
 
 #include <fmt/core.h>
 
+#include <CLI/App.hpp>
 #include <memory>
 #include <optional>
 #include <utility>

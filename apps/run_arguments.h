@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
 
+#include "apps/cli_names.h"
 #include "apps/command.h"
 #include "apps/option_arguments.h"
 #include "apps/run_sequence.h"

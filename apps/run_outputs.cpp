@@ -3,7 +3,7 @@
 
 #include <fmt/core.h>
 
-#include <CLI/CLI.hpp>
+#include <CLI/StringTools.hpp>
 #include <algorithm>
 #include <cmath>
 #include <functional>

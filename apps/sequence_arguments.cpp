@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/sequence_arguments.h"
 
+#include <CLI/App.hpp>
 #include <algorithm>
 #include <cctype>
 #include <string_view>

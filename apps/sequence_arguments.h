@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "apps/cli_names.h"
 #include "egosgm/odometry.h"
 #include "egosgm/vision/dataset.h"
 

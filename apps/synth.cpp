@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/core.h>
 
+#include <CLI/App.hpp>
+
 #include "apps/command.h"
 #include "apps/counted.h"
 #include "apps/interrupt.h"

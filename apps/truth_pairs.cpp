@@ -3,6 +3,8 @@
 
 #include <fmt/core.h>
 
+#include <CLI/App.hpp>
+
 #include "apps/option_group.h"
 #include "apps/run_folder.h"
 #include "egosgm/error.h"

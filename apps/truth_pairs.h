@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <string>
 
+#include "apps/cli_names.h"
 #include "egosgm/vision/evaluation.h"
 #include "vision/pair_with_truth.h"
 
