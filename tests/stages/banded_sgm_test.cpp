@@ -231,7 +231,7 @@ TEST(BandedSgmStripes, TooLittleMemoryForOneNamesTheLimit) {
 }
 
 TEST(BandedSgmPathsGroup, LargerThanTheDeviceAllowsNamesTheLimit) {
-  const std::size_t limit = ocl::Context(testing::any_device()).max_work_group_size();
+  const std::size_t limit = testing::shared_context().max_work_group_size();
   const int lines = static_cast<int>(limit / 16) + 1;
   const Case c{.size = {9, 5}, .range = {0, 16}, .scheduling = Scheduling::kPaths, .group = {{16, lines}}};
   expect_refused<DeviceError>([&] { match(c); }, {"BandedSgm: kernel follow_paths", std::to_string(16 * lines),
