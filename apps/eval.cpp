@@ -29,7 +29,6 @@ using vision::DisparityCounts;
 using vision::DisparityMetrics;
 using Json = nlohmann::ordered_json;
 
-constexpr std::size_t kMaxReportBytes = std::size_t{1} << 30;
 constexpr double kMostPixels = 1e12;     // of a pair of a report, and their errors
 constexpr std::size_t kLongFolder = 20;  // frames; a progress bar from here on
 
@@ -216,7 +215,7 @@ int merge(const EvalArguments& arguments) {
   Result result;
   std::map<std::string, std::string> read;  // pairs, and the first file that holds them
   for (const std::string& file : arguments.reports) {
-    const Json report = parse_json(vision::read_file(file, kMaxReportBytes), file);
+    const Json report = parse_json(vision::read_file(file, kMaxJsonBytes), file);
     const std::vector<DisparityCounts> all = counts_of(report, file);
     auto pair = report.at("pairs").begin();
     for (const DisparityCounts& counts : all) {

@@ -20,7 +20,6 @@ using Json = nlohmann::ordered_json;
 /// Files of all frames, which a run that stops writes up to there.
 const std::set<std::string> kGrowing{"poses.txt", kRunObjects};
 
-constexpr std::size_t kMaxReportBytes = std::size_t{1} << 30;
 constexpr std::size_t kAnySize = std::numeric_limits<std::size_t>::max() - 1;
 
 /// Resolves a path, also one that is not there yet. A pipe of this process is in no folder: it keeps its name.
@@ -173,7 +172,7 @@ void OutputFolder::look() {
     throw InvalidArgument(
         fmt::format("--resume: {} has no report.json, which says how a run was made: give another --out", shown_));
   }
-  earlier_ = parse_json(vision::read_file(file, kMaxReportBytes), file);
+  earlier_ = parse_json(vision::read_file(file, kMaxJsonBytes), file);
   if (!earlier_.is_object() || earlier_.value("program", Json()) != "egosgm") {
     throw InvalidArgument(fmt::format("--resume: {} is no report of a run: give another --out", file.string()));
   }

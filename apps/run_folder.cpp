@@ -18,7 +18,6 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-constexpr std::size_t kMaxReportBytes = std::size_t{1} << 30;
 
 fs::path report_of(const fs::path& path) {
   std::error_code error;
@@ -58,7 +57,7 @@ std::vector<int> numbers_of(const Json& run) {
 std::optional<vision::StereoSequence> frames_of_run(const fs::path& path) {
   const fs::path file = report_of(path);
   if (file.empty()) return std::nullopt;
-  const Json run = parse_json(vision::read_file(file, kMaxReportBytes), file);
+  const Json run = parse_json(vision::read_file(file, kMaxJsonBytes), file);
   if (run.is_discarded()) throw InvalidArgument(file.string() + ": is no JSON: it was cut or edited; run it again");
   if (!run.is_object() || !run.contains("frames")) return std::nullopt;
   vision::StereoSequence sequence;
