@@ -128,10 +128,11 @@ class StereoVideo:
         _expect_names(options)
         _expect_kinds(frames=frames, motion=motion, objects=objects, outputs=outputs, odometry=odometry)
         paths = [source] if isinstance(source, (str, os.PathLike)) else source if isinstance(source, (tuple, list)) and len(source) == 2 else []
-        if paths and all(isinstance(path, (str, os.PathLike)) for path in paths):
+        is_path = bool(paths) and all(isinstance(path, (str, os.PathLike)) for path in paths)
+        if is_path:
             source, calibration = _opened([os.fsdecode(path) for path in paths], frames, calibration)
-        if frames and not isinstance(source, _egosgm.StereoSequence):
-            raise _egosgm.InvalidArgument(f"frames={frames!r}: only a folder's are chosen here")
+        if frames and not (is_path and isinstance(source, _egosgm.StereoSequence)):
+            raise _egosgm.InvalidArgument(f"frames={frames!r}: only a folder's are chosen here; open_folder and open_patterns take frames, too")
         if not hasattr(source, "__iter__") and not isinstance(source, (_egosgm.StereoSequence, Bag)):
             raise _egosgm.InvalidArgument(f"source: is a {type(source).__name__}: give a path, a sequence, a bag, or pairs of images, as egosgm.live.LivePairs takes from cameras")
         self.sequence = source if isinstance(source, _egosgm.StereoSequence) else None

@@ -187,6 +187,7 @@ def test_what_is_wrong_with_a_folder_is_said_before_a_frame_is_read(street_folde
     for given, words in ((dict(p22=1), "choose from"), (dict(odometry=dict(min_inlier=1)), "min_inliers"),
                          (dict(motion=False, odometry=dict(min_inliers=9)), "odometry: has options, but")):
         expect_refused(words, lambda: egosgm.run(street_folder, **given))
+    expect_refused("only a folder's are chosen here; open_folder", lambda: egosgm.run(egosgm.open_folder(street_folder), frames="1:2"))
     expect_refused('output "disparty"', lambda: next(iter(egosgm.run(street_folder, outputs="disparty", motion=False, **OPTIONS))))
 
 
