@@ -14,18 +14,28 @@ class Matcher:
     Each pair is matched alone, with eight paths unless `paths` says otherwise. All else is for Pipeline: device, preset and its options.
     """
 
+    __slots__ = ("_disparities", "_made_for", "_min_disparity", "_options", "_pipeline")  # an option set later would change nothing
+
     def __init__(self, min_disparity: int = 0, disparities: int = 128, *, device: Union[str, int] = "", preset: str = "default", **options: Any) -> None:
         if options.pop("temporal", False):
             raise _egosgm.InvalidArgument("temporal: a Matcher matches each pair alone: leave it out; Pipeline and run() predict")
         options = {"preset": preset, "paths": 8, **options, "min_disparity": min_disparity, "disparities": disparities, "temporal": False}
         known = _egosgm.pipeline_options(**{name: value for name, value in options.items() if name != "cache"})
-        self.min_disparity, self.disparities = known["min_disparity"], known["disparities"]
+        self._min_disparity, self._disparities = known["min_disparity"], known["disparities"]
         end = self.min_disparity + self.disparities
         if not (self.min_disparity > -2047 and end <= 2047):
             raise _egosgm.InvalidArgument(f"disparities {self.min_disparity} to {end - 1} do not fit into 16 bits with 16 steps a pixel; Pipeline gives float")
         self._options = {"device": device, **options}
         self._pipeline: Optional[_egosgm.Pipeline] = None
         self._made_for: Tuple[Any, ...] = ()
+
+    @property
+    def min_disparity(self) -> int:
+        return self._min_disparity
+
+    @property
+    def disparities(self) -> int:
+        return self._disparities
 
     def __repr__(self) -> str:
         return f"<Matcher of {self.disparities} disparities from {self.min_disparity}>"

@@ -356,6 +356,10 @@ def test_the_matcher_has_opencvs_values(street, frames):
                         (lambda: matcher.compute(*[np.ma.masked_less(frames[0].left, 9)] * 2), "left has a mask"),
                         (lambda: egosgm.Matcher(numDisparities=64), "choose from"), (lambda: egosgm.Matcher(0, 64.5), "64.5"), (lambda: egosgm.Matcher(0, None), "None")):
         expect_refused(named, call)
+    for name in ("disparities", "min_disparity", "paths"):
+        with pytest.raises(AttributeError):
+            setattr(matcher, name, 8)
+    assert (matcher.min_disparity, matcher.disparities) == (0, 48)
 
 
 def test_the_page_for_those_who_come_from_elsewhere_names_options_that_exist():
