@@ -80,6 +80,7 @@ def test_a_cloud_keeps_the_reasons_that_were_chosen():
     for wrong, words in ((dict(reasons="sure"), 'no "sure": choose from trusted'), (dict(max_sigma=0), "max_relative_sigma"),
                          (dict(colors=np.zeros((4, 6, 2), np.uint8)), "colors is"), (dict(colors=np.zeros((4, 5), np.uint8)), "one size")):
         expect_refused(words, lambda: egosgm.point_cloud(frame, **wrong))
+    expect_refused("frame is a ndarray: give a frame of run", lambda: egosgm.point_cloud(frame.disparity, CAMERA))
 
 
 @pytest.mark.filterwarnings("error")

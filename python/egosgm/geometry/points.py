@@ -57,6 +57,8 @@ def point_cloud(frame: Any, max_sigma: float = 0.1, reasons: Union[str, Sequence
     than max_depth_m; and the disparity of one of its four neighbours differs by at most max_jump_px.
     colors: an image to take the colours from, H x W or H x W x 3 (RGB), in place of the frame's left one, which is grey where run() read files.
     """
+    if not hasattr(frame, "calibration"):
+        raise _egosgm.InvalidArgument(f"point_cloud: frame is a {type(frame).__name__}: give a frame of run(); depth_from_disparity takes a map")
     if frame.calibration is None:
         raise _egosgm.InvalidArgument("point_cloud: a disparity is no depth without a calibration: give it to run()")
     needed = ["disparity", "variance"] + ["reason"] * bool(reasons)
