@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "egosgm/motion.h"
 
+#include <string>
+
 #include "egosgm/error.h"
 
 namespace egosgm {
@@ -10,9 +12,10 @@ void Motion::validate() const {
     throw InvalidArgument("motion: not all values are finite: check its source");
   const Eigen::Matrix3d rotation = current_from_previous.linear();
   const double deviation = (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-  if (deviation > 1e-4 || rotation.determinant() < 0) {
-    throw InvalidArgument("motion: its 3x3 part is not a rotation (R R^T differs from 1 by " +
-                          std::to_string(deviation) + "): give an orthonormal right-handed one");
+  const bool is_orthonormal = deviation <= 1e-4;
+  if (!is_orthonormal || rotation.determinant() < 0) {
+    const std::string why = is_orthonormal ? "it mirrors" : "R R^T differs from 1 by " + std::to_string(deviation);
+    throw InvalidArgument("motion: its 3x3 part is not a rotation (" + why + "): give an orthonormal right-handed one");
   }
   if (current_from_previous.matrix().row(3) != Eigen::RowVector4d(0, 0, 0, 1)) {
     throw InvalidArgument("motion: the last row of its 4x4 matrix is not 0 0 0 1: give a rigid motion");

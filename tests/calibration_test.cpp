@@ -92,7 +92,7 @@ TEST(Motion, RefusesWhatIsNoneBySayingWhy) {
   const std::string no_rotation = "motion: its 3x3 part is not a rotation";
   const std::pair<std::vector<std::string>, void (*)(Motion&)> cases[] = {
       {{no_rotation, "give an orthonormal"}, [](Motion& m) { m.current_from_previous.linear() *= 1.001; }},
-      {{no_rotation}, [](Motion& m) { m.current_from_previous.linear().col(0) *= -1; }},  // a mirror
+      {{no_rotation, "it mirrors"}, [](Motion& m) { m.current_from_previous.linear().col(0) *= -1; }},
       {{no_rotation}, [](Motion& m) { m.current_from_previous.linear()(0, 1) += 0.01; }},
       {{no_rotation}, [](Motion& m) { m.current_from_previous.linear().setZero(); }},
       {{"motion: ", "0 0 0 1"}, [](Motion& m) { m.current_from_previous.matrix()(3, 3) = 2; }},
