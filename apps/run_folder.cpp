@@ -18,7 +18,6 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-
 fs::path report_of(const fs::path& path) {
   std::error_code error;
   fs::path folder = fs::weakly_canonical(path, error);
