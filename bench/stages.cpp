@@ -55,6 +55,7 @@ std::map<std::string, double> bytes_of(shared::ImageSize size, double cells) {
           {"SpeckleRemoval", 2 * map},
           // Both views' codes, prediction and measurement, those of a quarter, and what is given out of the left view.
           {"Evidence", codes * 17 / 16 + 2 * maps + 2 * map},
+          {"TexturelessRegions", grey / 2 + map},
           {"KalmanUpdate", 6 * maps},
           {"OutputVariance", 12 * map}};
 }

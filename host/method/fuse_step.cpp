@@ -6,6 +6,7 @@ namespace egosgm {
 FuseStep::FuseStep(ocl::Context& context, shared::ImageSize size, const MethodOptions& options)
     : left_right_px_(options.consistency.update_px),
       outside_(outside_view(options.consistency)),
+      textureless_regions_([&context, size](PixelType type) { return TexturelessRegions(context, size, type); }),
       kalman_update_(context, size, options.kalman_update),
       consistency_(context, size) {
   if (Evidence::is_of(options)) evidence_.emplace(context, size, options);
@@ -19,6 +20,7 @@ FuseStep::FuseStep(ocl::Context& context, shared::ImageSize size, const MethodOp
 }
 
 void FuseStep::prepare(PixelType type) {
+  if (evidence_) textureless_regions_.prepare(type);
   if (weighted_median_) weighted_median_->prepare(type);
   if (sad_check_) sad_check_->prepare(type);
 }
@@ -47,8 +49,9 @@ void FuseStep::update(const Plan& plan, const Matched& matched, const Prediction
   if (sad_check_) (*sad_check_)[matched.images.type].check(matched.images.pixels, belief.disparity, checked);
 }
 
-void FuseStep::publish(const Plan& plan, const Belief& belief, Map& confirmed) {
+void FuseStep::publish(const Plan& plan, const FrameImages& images, const Belief& belief, Map& confirmed) {
   evidence_->publish(belief.maps.disparity, belief.evidence, confirmed, plan.published(), plan.tracked);
+  textureless_regions_[images.type].leave_out(images.pixels, confirmed, plan.published());
 }
 
 }  // namespace egosgm

@@ -8,6 +8,7 @@
 #include "host/stages/kalman_update.h"
 #include "host/stages/right_map.h"
 #include "host/stages/sad_check.h"
+#include "host/stages/textureless_regions.h"
 #include "host/stages/weighted_median.h"
 
 namespace egosgm {
@@ -45,13 +46,14 @@ class FuseStep {
               Fusion& fusion, Belief& belief);
 
   /// Writes which of a belief's disparities are published. REQUIRES: the method has evidence.
-  void publish(const Plan& plan, const Belief& belief, Map& confirmed);
+  void publish(const Plan& plan, const FrameImages& images, const Belief& belief, Map& confirmed);
   bool has_evidence() const { return evidence_.has_value(); }
 
  private:
   const float left_right_px_;
   const OutsideView outside_;
   std::optional<Evidence> evidence_;
+  OfEachType<TexturelessRegions> textureless_regions_;
   KalmanUpdate kalman_update_;
   std::optional<OfEachType<WeightedMedian>> weighted_median_;
   std::optional<RightMap> right_map_;  // where the left view alone is tracked

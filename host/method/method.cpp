@@ -23,7 +23,7 @@ FrameResults Method::frame(const Plan& plan, const FrameImages& uploaded, const 
   in(Step::kFuse, [&] { fuse(plan, images, w.prediction, measured, w.fusion, after); });
   StereoMaps result{after.maps.disparity, output.variance};
   in(Step::kPublish, [&] {
-    result.disparity = confirmed(plan, after, output.disparity);
+    result.disparity = confirmed(plan, images, after, output.disparity);
     publish_.complete(plan, w.prediction, after.maps, measured, result);
     const Prediction* prediction = plan.predicts() ? &w.prediction : nullptr;
     publish_.write(plan,
@@ -73,9 +73,9 @@ const FlagMap* Method::evidence_of(const Belief& belief) const {
   return fuse_ && fuse_->has_evidence() ? &belief.evidence : nullptr;
 }
 
-Map Method::confirmed(const Plan& plan, const Belief& belief, Map& confirmed) {
+Map Method::confirmed(const Plan& plan, const FrameImages& images, const Belief& belief, Map& confirmed) {
   if (!evidence_of(belief)) return belief.maps.disparity;
-  fuse_->publish(plan, belief, confirmed);
+  fuse_->publish(plan, images, belief, confirmed);
   return confirmed;
 }
 

@@ -71,7 +71,7 @@ class Method {
               VerticalOffset& refined);
   void fuse(const Plan& plan, const FrameImages& images, const Prediction& prediction, const StereoMaps& measured,
             Fusion& fusion, Belief& belief);
-  Map confirmed(const Plan& plan, const Belief& belief, Map& confirmed);
+  Map confirmed(const Plan& plan, const FrameImages& images, const Belief& belief, Map& confirmed);
   const FlagMap* evidence_of(const Belief& belief) const;
 
   ocl::Context& context_;

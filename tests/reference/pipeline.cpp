@@ -26,6 +26,7 @@
 #include "tests/reference/sad_check.h"
 #include "tests/reference/speckle_removal.h"
 #include "tests/reference/step_penalties.h"
+#include "tests/reference/textureless_regions.h"
 #include "tests/reference/weighted_median.h"
 
 namespace egosgm::reference {
@@ -91,7 +92,8 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
   if (has_evidence()) {
     testing::HostMaps belief = frame.result;
     belief.evidence = frame.evidence;
-    frame.output = confirmed(size_, belief, !options_.track_right);
+    frame.output =
+        textureless_regions(size_, frame.passes.back().images, step, confirmed(size_, belief, !options_.track_right));
   }
   const testing::HostMaps output =
       row_interpolation(size_, step,

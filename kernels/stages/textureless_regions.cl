@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+// Textureless regions that run out of the image at its top, as a sky does. Nothing bounds them there: what little of
+// them has a disparity, has that of the outlines beside it. So where fewer than half of a region's pixels have one,
+// none of them is published. A wall in the sun is filled from all of its sides, and stays.
+//
+// A region is of blocks of EGOSGM_COARSE x EGOSGM_COARSE pixels that are connected by their sides. Its label is the
+// least column of its blocks at the top, counted from 1 on. Labels spread along columns and rows by turns, so many
+// times.
+#include "grey.h"
+#include "method.h"
+#include "pixels.h"
+
+// lint: PIXEL_BYTES=1 PIXELS=1
+// lint: PIXEL_BYTES=2 PIXELS=16
+
+#define TEXTURED 0
+#define UNREACHED 0xffff  // by a label
+
+static inline ImageSize size_in_blocks(const ImageSize size) {
+  const ImageSize blocks = {(size.width + EGOSGM_COARSE - 1) / EGOSGM_COARSE,
+                            (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE};
+  return blocks;
+}
+
+// The blocks of a row of them that a work-item takes.
+#define FOR_BLOCKS_OF_ROW(x, blocks) for (int x = at.x; x < (blocks).width; x += at.items)
+
+// Whether each of four blocks has no texture, by its least and largest grey value: -1 or 0. One that is black has none,
+// either, but is the edge of a rectified image.
+static inline int4 are_textureless(const int4 least, const int4 largest) {
+  return EGOSGM_TEXTURELESS_CONTRAST * (largest - least) < largest;
+}
+
+static inline int block_is_textureless(const ImageSize size, global const Pixel* image, const int x, const int y) {
+  Pixel least = image[(size_t)y * size.width + x], largest = least;
+  for (int v = y; v < min(y + EGOSGM_COARSE, size.height); ++v) {
+    for (int u = x; u < min(x + EGOSGM_COARSE, size.width); ++u) {
+      const Pixel grey = image[(size_t)v * size.width + u];
+      least = min(least, grey);
+      largest = max(largest, grey);
+    }
+  }
+  return are_textureless((int4)(least), (int4)(largest)).x;
+}
+
+#if PIXELS > 1
+// The same of four blocks side by side that lie within the image.
+static inline int4 four_are_textureless(const ImageSize size, global const Pixel* image, const int x, const int y) {
+  Pixels least = load_grey(image + (size_t)y * size.width + x), largest = least;
+  for (int v = y + 1; v < y + EGOSGM_COARSE; ++v) {
+    const Pixels greys = load_grey(image + (size_t)v * size.width + x);
+    least = min(least, greys);
+    largest = max(largest, greys);
+  }
+  const int4 least_of_each = convert_int4(min(min(least.s048c, least.s159d), min(least.s26ae, least.s37bf)));
+  const int4 largest_of_each = convert_int4(max(max(largest.s048c, largest.s159d), max(largest.s26ae, largest.s37bf)));
+  return are_textureless(least_of_each, largest_of_each);
+}
+#endif
+
+COMPILED_ONCE void find_in_row(const WorkItem at, const ImageSize size, global const uchar* images,
+                               global ushort* labels) {
+  const ImageSize blocks = size_in_blocks(size);
+  global const Pixel* image = (global const Pixel*)images + (size_t)at.view * size.height * size.width;
+  global ushort* row = labels + ((size_t)at.view * blocks.height + at.y) * blocks.width;
+  FOR_BLOCKS_OF_ROW(x, blocks) {
+    const ushort label = at.y == 0 ? x + 1 : UNREACHED;
+#if PIXELS > 1
+    if (EGOSGM_COARSE * x + PIXELS <= size.width && EGOSGM_COARSE * (at.y + 1) <= size.height) {
+      const ushort4 labels_of_four = label + (at.y == 0 ? (ushort4)(0, 1, 2, 3) : (ushort4)(0));
+      const int4 textureless = four_are_textureless(size, image, EGOSGM_COARSE * x, EGOSGM_COARSE * at.y);
+      vstore4(select((ushort4)(TEXTURED), labels_of_four, convert_short4(textureless)), 0, row + x);
+      x += 3;
+      continue;
+    }
+#endif
+    row[x] = block_is_textureless(size, image, EGOSGM_COARSE * x, EGOSGM_COARSE * at.y) ? label : TEXTURED;
+  }
+}
+
+// A block a work-item, or a row of them.
+KERNEL void find_textureless(const ImageSize size, global const uchar* images, global ushort* labels) {
+  find_in_row(THIS_WORK_ITEM, size, images, labels);
+}
+
+// Gives a block the label of the one before it where that is less. Returns what the next one is given.
+static inline ushort spread_to(const ushort before, global ushort* label) {
+  const ushort own = *label;
+  if (own == TEXTURED) return UNREACHED;
+  *label = min(before, own);
+  return min(before, own);
+}
+
+// Along a row of blocks (in_rows), or a column, and back. A row, or a column, a work-item and view.
+KERNEL void spread_labels(const ImageSize blocks, const int in_rows, global ushort* labels) {
+  const int count = in_rows ? blocks.width : blocks.height, step = in_rows ? 1 : blocks.width;
+  global ushort* line = labels + (size_t)get_global_id(1) * blocks.height * blocks.width +
+                        get_global_id(0) * (in_rows ? blocks.width : 1);
+  ushort before = UNREACHED;
+  for (int i = 0; i < count; ++i) before = spread_to(before, line + (size_t)i * step);
+  before = UNREACHED;
+  for (int i = count - 1; i >= 0; --i) before = spread_to(before, line + (size_t)i * step);
+}
+
+static inline int has_label(const ushort label) { return label != TEXTURED && label != UNREACHED; }
+
+static inline void add_counts(global int* counts, const ushort label, const int pixels, const int filled) {
+  if (!has_label(label)) return;
+  atomic_add(&counts[2 * label], pixels);
+  atomic_add(&counts[2 * label + 1], filled);
+}
+
+COMPILED_ONCE void count_row(const WorkItem at, const ImageSize size, const int row_step, global const float* disparity,
+                             global const ushort* labels, global int* counts) {
+  const ImageSize blocks = size_in_blocks(size);
+  global const float* view = disparity + (size_t)at.view * size.height * size.width;
+  global const ushort* row = labels + ((size_t)at.view * blocks.height + at.y) * blocks.width;
+  global int* of_view = counts + 2 * at.view * (blocks.width + 1);
+  ushort label = TEXTURED;
+  int pixels = 0, filled = 0;
+  FOR_BLOCKS_OF_ROW(x, blocks) {
+    if (row[x] != label) {
+      add_counts(of_view, label, pixels, filled);
+      label = row[x];
+      pixels = 0;
+      filled = 0;
+    }
+    if (!has_label(label)) continue;
+    for (int v = EGOSGM_COARSE * at.y; v < min(EGOSGM_COARSE * (at.y + 1), size.height); ++v) {
+      for (int u = EGOSGM_COARSE * x; u < min(EGOSGM_COARSE * (x + 1), size.width) && v % row_step == 0; ++u) {
+        ++pixels;
+        filled += view[(size_t)v * size.width + u] > EGOSGM_INVALID_DISPARITY;
+      }
+    }
+  }
+  add_counts(of_view, label, pixels, filled);
+}
+
+// Counts of each label, which are 0 before: its pixels, and those that have a disparity.
+KERNEL void count_filled(const ImageSize size, const int row_step, global const float* disparity,
+                         global const ushort* labels, global int* counts) {
+  count_row(THIS_WORK_ITEM, size, row_step, disparity, labels, counts);
+}
+
+COMPILED_ONCE void leave_out_of_row(const WorkItem at, const ImageSize size, const int row_step,
+                                    global const ushort* labels, global const int* counts, global float* disparity) {
+  const ImageSize blocks = size_in_blocks(size);
+  global float* view = disparity + (size_t)at.view * size.height * size.width;
+  global const ushort* row = labels + ((size_t)at.view * blocks.height + at.y) * blocks.width;
+  global const int* of_view = counts + 2 * at.view * (blocks.width + 1);
+  FOR_BLOCKS_OF_ROW(x, blocks) {
+    const ushort label = row[x];
+    if (!has_label(label) || 2 * of_view[2 * label + 1] >= of_view[2 * label]) continue;
+    for (int v = EGOSGM_COARSE * at.y; v < min(EGOSGM_COARSE * (at.y + 1), size.height); ++v) {
+      for (int u = EGOSGM_COARSE * x; u < min(EGOSGM_COARSE * (x + 1), size.width) && v % row_step == 0; ++u) {
+        view[(size_t)v * size.width + u] = EGOSGM_INVALID_DISPARITY;
+      }
+    }
+  }
+}
+
+KERNEL void leave_out(const ImageSize size, const int row_step, global const ushort* labels, global const int* counts,
+                      global float* disparity) {
+  leave_out_of_row(THIS_WORK_ITEM, size, row_step, labels, counts, disparity);
+}
