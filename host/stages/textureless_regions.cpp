@@ -9,8 +9,8 @@ namespace egosgm {
 TexturelessRegions::TexturelessRegions(ocl::Context& context, shared::ImageSize size, PixelType type, int pixels)
     : stage_(context, "TexturelessRegions", "textureless_regions.cl", size, pixels, pixel_define(type)),
       blocks_(CoarseMatch::coarse_size(size)),
-      labels_(context, 2 * pixel_count(blocks_)),
-      counts_(context, 2 * 2 * (static_cast<std::size_t>(blocks_.width) + 1)),
+      labels_(context, ocl::Scratch::kOfStage0, 2 * pixel_count(blocks_)),
+      counts_(context, ocl::Scratch::kOfStage1, 2 * 2 * (static_cast<std::size_t>(blocks_.width) + 1)),
       find_(stage_, "find_textureless"),
       spread_(stage_, "spread_labels"),
       count_(stage_, "count_filled"),
