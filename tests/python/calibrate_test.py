@@ -157,7 +157,7 @@ def test_a_charuco_board(tmp_path, capsys):
     expect_the_cameras(tmp_path / "calib.yml", within_px=8)
 
 
-@pytest.mark.parametrize("board, named", [("8x6", "one of 7x5 is there"), ("7", "--board 7:"), ("2x9", "--board 2x9")])
+@pytest.mark.parametrize("board, named", [("8x6", "one of 7x5 is there"), ("6x5", "one of 7x5 is there"), ("8x5", "one of 7x5 is there"), ("7", "--board 7:"), ("2x9", "--board 2x9")])
 def test_a_wrong_size_of_the_board_is_named(board, named, pictures, tmp_path, capsys):
     for side in ("left", "right"):
         (tmp_path / side).mkdir()

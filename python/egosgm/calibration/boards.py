@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Boards of OpenCV in images: chessboards and ChArUco."""
+import collections
 from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import cv2
@@ -75,14 +76,14 @@ def charuco(columns: int, rows: int, square_m: float, marker_m: float, dictionar
 
 
 def other_size(greys: Sequence[NDArray[np.uint8]], columns: int, rows: int) -> Optional[Tuple[int, int]]:
-    """The size of a chessboard that is there in place of the one that is not."""
-    near: List[Tuple[int, int]] = [(columns - 1, rows - 1)]
-    near += [(c, r) for c in range(columns - 2, columns + 3) for r in range(rows - 2, rows + 3)]
+    """The size of a chessboard that is there in place of the one that is not: the one of most images, as a part of a board is found as a board, too."""
+    seen: "collections.Counter[Tuple[int, int]]" = collections.Counter()
     for grey in greys[:_TRIED]:
-        for size in near:
-            if min(size) >= 3 and size not in ((columns, rows), (rows, columns)) and chessboard(*size, 1.0).find(grey):
-                return size
-    return None
+        is_there, _, marks = cv2.findChessboardCornersSBWithMeta(grey, (3, 3), cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_LARGER)
+        size = (max(marks.shape), min(marks.shape)) if is_there else (0, 0)
+        if is_there and size not in ((columns, rows), (rows, columns)):
+            seen[size] += 1
+    return max(seen, key=lambda size: (seen[size], size[0] * size[1]), default=None)
 
 
 def drawn(grey: NDArray[np.uint8], corners: Corners, board: Board, columns: int, rows: int) -> NDArray[np.uint8]:
