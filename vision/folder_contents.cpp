@@ -9,6 +9,7 @@
 
 #include "egosgm/error.h"
 #include "vision/file_io.h"
+#include "vision/file_kinds.h"
 #include "vision/foreign_file.h"
 #include "vision/frame_names.h"
 
@@ -198,6 +199,8 @@ Contents euroc(const fs::path& folder) {
   return std::nullopt;
 }
 
+Contents recording(const fs::path& folder) { return is_bag(folder) ? Contents(kRecording) : std::nullopt; }
+
 Contents videos(const fs::path& folder) {
   for (const char* type : {".mp4", ".avi", ".mkv", ".mov"}) {
     const fs::path left = folder / ("left" + std::string(type)), right = folder / ("right" + std::string(type));
@@ -279,8 +282,8 @@ Contents result_of_a_run(const fs::path& folder) {
 }  // namespace
 
 Contents found_instead(const fs::path& folder) {
-  for (const auto& look : {multiview, sequences_below, euroc, videos, result_of_a_run, two_cameras, both_cameras,
-                           one_camera, folders_of_images, cameras_without_images}) {
+  for (const auto& look : {multiview, sequences_below, euroc, recording, videos, result_of_a_run, two_cameras,
+                           both_cameras, one_camera, folders_of_images, cameras_without_images}) {
     if (Contents found = look(folder)) return found;
   }
   return std::nullopt;

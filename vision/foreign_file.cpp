@@ -52,7 +52,8 @@ std::string foreign_kind(std::string_view start, const fs::path& file) {
     std::string_view bytes;
     std::string meaning;
   };
-  const std::string rosbag = "it is a recording of ROS under another name: name it .mcap, .bag or .db3";
+  const std::string rosbag =
+      is_bag(file) ? kRecording : "it is a recording of ROS under another name: name it .mcap, .bag or .db3";
   const std::string photo = "it is a HEIC or AVIF, as phones write: convert it to PNG or JPEG";
   const std::string misnamed =
       is_image_name(file) ? "" : "it is a PNG or JPEG under another name: name it .png, .jpg or .jpeg";

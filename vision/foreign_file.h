@@ -11,6 +11,7 @@
 namespace egosgm::vision {
 
 inline constexpr std::size_t kKindBytes = 300;  // of a file, which tell its kind
+inline constexpr const char* kRecording = "it is a recording of ROS, which `egosgm run` and `doctor` read";
 
 /// What a file is that people give in place of an image or of a sequence, by its first bytes, else by its name, and
 /// what to do with it: "it is a zip archive: unpack it". Empty where that is not known. Thread-safe.

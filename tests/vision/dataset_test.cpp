@@ -480,6 +480,11 @@ TEST_F(DatasetTest, WhatIsGivenInPlaceOfAFolderIsNamed) {
     add_text("drive.dat", content);
     refuses("drive.dat", {"drive.dat: is no folder; it is", named});
   }
+  add_text("drive.mcap", "\x89MCAP0"), add_text("drive.bag", "#ROSBAG V2.0");
+  add_text("bag/metadata.yaml", "rosbag2_bagfile_information:"), add_text("bag/drive.db3", "SQLite format 3");
+  for (const char* bag : {"drive.mcap", "drive.bag", "bag", "bag/drive.db3"}) {
+    refuses(bag, {bag, "it is a recording of ROS, which `egosgm run` and `doctor` read"});
+  }
   add_text("DSCF0001.MPO", "\xff\xd8\xff");
   refuses("DSCF0001.MPO", {"both pictures of a 3D camera", "--side-by-side"});
   for (const auto& [name, named] : {std::pair{"pair.npz", "arrays of NumPy"},
