@@ -267,8 +267,12 @@ void bind_files(py::module_& module) {
   module.def("_is_video", &vision::is_video, py::arg("file"));
   module.def(
       "_foreign_kind",
-      [](const path& file) { return vision::foreign_kind(vision::read_file_start(file, vision::kKindBytes), {}); },
-      py::arg("file"), "What a file is by its first bytes, whatever its name, and what to do with it.");
+      [](const path& file) {
+        const std::string start = vision::read_file_start(file, vision::kKindBytes);
+        return vision::foreign_kind(start, vision::is_bag(file) ? file : path());
+      },
+      py::arg("file"),
+      "What a file is by its first bytes, whatever its name where it is no bag's, and what to do with it.");
   module.def(
       "_find_two_cameras",
       [](const path& folder) -> std::optional<std::pair<std::string, std::string>> {

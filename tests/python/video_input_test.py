@@ -131,3 +131,9 @@ def test_a_video_that_is_damaged_or_none_is_named_so(videos, tmp_path, told):
         expect_refused(named, lambda: egosgm.run(file))
     assert "named as a video" in told("run", none, videos[1], "--out", tmp_path / "out", code=2)
     assert "a video, and an input of its own" in told("doctor", videos[2], "--frames", "1:", code=2)
+
+
+def test_a_bag_in_place_of_a_video_is_told_where_it_goes(calib, tmp_path, capsys):
+    (tmp_path / "drive.mcap").write_bytes(b"\x89MCAP0\r\n")
+    assert run_tool(["rectify", "--side-by-side", str(tmp_path / "drive.mcap"), "--calib", str(calib), "--out", str(tmp_path / "out")]) == 2
+    assert "drive.mcap: it is a recording of ROS, which `egosgm run` and `doctor` read" in capsys.readouterr().err
