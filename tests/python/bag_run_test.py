@@ -220,6 +220,12 @@ def test_a_recording_that_is_finished_stays_where_the_viewer_fails():
     assert said[4:] == ["recording given up"]
 
 
+def test_a_recording_that_cannot_be_made_is_named_as_it_was_given():
+    outputs = bag_program.Outputs("/proc/self/drive.mcap", False)
+    with pytest.raises(egosgm.IoError, match="^/proc/self/drive.mcap: cannot be written: .*choose a folder"):
+        outputs.begin({}, None)
+
+
 def test_a_folder_is_that_of_any_run(tmp_path, street, frames, street_folder, capfd):
     """The maps of a folder with the same images, and what report and cloud read; options, warnings and --resume are those of any run."""
     bag, out = record("sqlite", tmp_path / "drive", street, frames), tmp_path / "result"

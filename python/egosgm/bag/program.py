@@ -81,7 +81,8 @@ class Outputs:
     def begin(self, options: Dict[str, Any], calibration: _egosgm.Calibration) -> None:
         self._calibration = calibration
         if self._file:
-            self._outputs.append(McapOutput(self._file, options) if self._file.suffix == ".mcap" else RerunOutput(self._file))
+            with self._naming_the_file():
+                self._outputs.append(McapOutput(self._file, options) if self._file.suffix == ".mcap" else RerunOutput(self._file))
         if self._viewer:
             self._outputs.append(RerunOutput())
         if self._page_output:
@@ -105,7 +106,7 @@ class Outputs:
 
     @contextlib.contextmanager
     def _naming_the_file(self) -> Iterator[None]:
-        """A stream's own error does not name it."""
+        """A stream's own error does not name it, or by the name of what is written until it is whole."""
         try:
             yield
         except OSError as error:
