@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Boards of OpenCV in images: chessboards and ChArUco."""
 import collections
-from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, NamedTuple, Optional, Sequence, Tuple
 
 import cv2
 import numpy as np
