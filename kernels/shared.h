@@ -92,6 +92,13 @@ typedef struct {
   i32 width, height;
 } ImageSize;
 
+// The size of what has one for EGOSGM_COARSE x EGOSGM_COARSE pixels of an image, or for those that its edge leaves.
+static inline ImageSize coarse_size(const ImageSize size) {
+  const ImageSize coarse = {(size.width + EGOSGM_COARSE - 1) / EGOSGM_COARSE,
+                            (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE};
+  return coarse;
+}
+
 // Disparities [min, min + count).
 typedef struct {
   i32 min, count;

@@ -84,9 +84,9 @@ std::string fault_name(const ::testing::TestParamInfo<Fault>& info) {
   return kCodes.at(code) + (is_late ? "Late" : "AtOnce") + (separate_memory ? "SeparateMemory" : "");
 }
 
-/// Of the calls that build a pipeline every 47th fails, others for every code; with EGOSGM_ALL_FAULTS all of them (the
+/// Of the calls that build a pipeline every 23rd fails, others for every code; with EGOSGM_ALL_FAULTS all of them (the
 /// lane `faults`).
-int stride() { return std::getenv("EGOSGM_ALL_FAULTS") ? 1 : 47; }
+int stride() { return std::getenv("EGOSGM_ALL_FAULTS") ? 1 : 23; }
 
 class FaultTest : public ::testing::TestWithParam<Fault> {
  protected:

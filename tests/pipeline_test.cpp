@@ -51,7 +51,7 @@ void expect_same(const reference::Pass& actual, const reference::Pass& expected,
     return same_bits(of_views(of_actual, views, rows), of_views(of_expected, views, rows), rows);
   };
   EXPECT_TRUE(same_bits(actual.images, expected.images, size)) << "images";
-  EXPECT_TRUE(same_bits(actual.coarse, expected.coarse, CoarseMatch::coarse_size(size))) << "coarse match";
+  EXPECT_TRUE(same_bits(actual.coarse, expected.coarse, shared::coarse_size(size))) << "coarse match";
   EXPECT_TRUE(same(actual.band.bands, expected.band.bands, size)) << "bands";
   EXPECT_TRUE(same(actual.band.cell_offsets, expected.band.cell_offsets, size)) << "cell offsets";
   EXPECT_TRUE(same(actual.band.row_sums, expected.band.row_sums, {1, size.height})) << "row sums";

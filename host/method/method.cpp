@@ -83,7 +83,7 @@ Workspace::Workspace(ocl::Context& context, shared::ImageSize size, const Method
     : prediction(context, size),
       aligned{ocl::Buffer<cl_uchar>(context, options.vertical_alignment.enabled ? 2 * 2 * pixel_count(size) : 0)},
       first_offset(context),
-      coarse(context, 2 * pixel_count(CoarseMatch::coarse_size(size))),
+      coarse(context, 2 * pixel_count(shared::coarse_size(size))),
       bands(context, size, range_of(options)),
       matching(context, size),
       measured(context, size),

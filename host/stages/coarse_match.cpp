@@ -10,10 +10,6 @@ int floor_div(int a, int b) { return a / b - (a % b < 0); }
 
 }  // namespace
 
-shared::ImageSize CoarseMatch::coarse_size(shared::ImageSize size) {
-  return {(size.width + EGOSGM_COARSE - 1) / EGOSGM_COARSE, (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE};
-}
-
 shared::DisparityRange CoarseMatch::coarse_range(shared::DisparityRange range) {
   const int first = floor_div(range.min, EGOSGM_COARSE);
   const int last = floor_div(range.min + range.count - 1, EGOSGM_COARSE);
@@ -33,9 +29,9 @@ Shrink::Shrink(ocl::Context& context, shared::ImageSize size, PixelType type)
     : stage_(context, "CoarseMatch", "coarse_match.cl", size, 0, pixel_define(type)), shrink_(stage_, "shrink") {}
 
 void Shrink::shrink(const FrameImages& images, FrameImages& coarse) {
-  const shared::ImageSize coarse_size = CoarseMatch::coarse_size(stage_.size());
+  const shared::ImageSize size = shared::coarse_size(stage_.size());
   const int at_once = stage_.pixels() == 1 ? 1 : EGOSGM_COARSE;
-  const shared::ImageSize work_items{(coarse_size.width + at_once - 1) / at_once, coarse_size.height};
+  const shared::ImageSize work_items{(size.width + at_once - 1) / at_once, size.height};
   stage_.launch(shrink_, ocl::every_pixel(stage_.enter(), work_items), stage_.size(), images.pixels, coarse.pixels);
 }
 
@@ -50,7 +46,7 @@ BandedSgm::Tile CoarseMatch::tile(const ocl::Context& context, const MethodOptio
 CoarseMatch::CoarseMatch(ocl::Context& context, shared::ImageSize size, const MethodOptions& options,
                          BandedSgm::Tile tile)
     : context_((context.enter("CoarseMatch"), context)),
-      coarse_(coarse_size(size)),
+      coarse_(shared::coarse_size(size)),
       range_(coarse_range(range_of(options))),
       max_difference_px_(options.coarse_match.max_difference_px),
       shrink_([=, &context](PixelType type) { return Shrink(context, size, type); }),

@@ -32,7 +32,7 @@ class CoarseMatch {
   /// Builds what images of `type` need.
   void prepare(PixelType type) { shrink_.prepare(type); }
 
-  /// Writes the left-right consistent disparities of both views, `coarse_size` of the images' each. REQUIRES: the
+  /// Writes the left-right consistent disparities of both views, shared::coarse_size of the images' each. REQUIRES: the
   /// images' type was prepared.
   void match(const FrameImages& images, Map& found);
 
@@ -42,7 +42,6 @@ class CoarseMatch {
   /// Both views at a quarter of the resolution, 16 bits: of the last call.
   const ocl::Buffer<cl_uchar>& images() const { return images_.pixels; }
 
-  static shared::ImageSize coarse_size(shared::ImageSize size);
   static shared::DisparityRange coarse_range(shared::DisparityRange range);
   /// The options of BandedSgm at that resolution.
   static BandedSgmOptions matcher(const MethodOptions& options);

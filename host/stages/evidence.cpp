@@ -11,7 +11,7 @@ namespace egosgm {
 namespace {
 
 std::size_t places(shared::ImageSize size) {
-  return 2 * static_cast<std::size_t>(EGOSGM_EVIDENCE_STRIDE(size.width)) * CoarseMatch::coarse_size(size).height;
+  return 2 * static_cast<std::size_t>(EGOSGM_EVIDENCE_STRIDE(size.width)) * shared::coarse_size(size).height;
 }
 
 }  // namespace
@@ -25,7 +25,7 @@ bool Evidence::is_of(const MethodOptions& options) {
 
 Evidence::Evidence(ocl::Context& context, shared::ImageSize size, const MethodOptions& options, int pixels)
     : stage_(context, "Evidence", "evidence.cl", size, pixels, ocl::Defines().set("CODE_BYTES", 8)),
-      coarse_(CoarseMatch::coarse_size(size)),
+      coarse_(shared::coarse_size(size)),
       gate_px_(options.kalman_update.gate_px > 0 ? options.kalman_update.gate_px
                                                  : std::numeric_limits<float>::infinity()),
       padding_(BandedSgm::code_padding(range_of(options))),

@@ -3,7 +3,6 @@
 
 #include <limits>
 
-#include "host/stages/coarse_match.h"
 #include "kernels/method.h"
 
 namespace egosgm {
@@ -21,7 +20,7 @@ KalmanUpdate::KalmanUpdate(ocl::Context& context, shared::ImageSize size, const 
                   .sees_again = false,
                   .row_step = 1},
       ask_neighbours_(options.ask_neighbours),
-      blocks_(CoarseMatch::coarse_size(size)),
+      blocks_(shared::coarse_size(size)),
       sums_(context, 2 * static_cast<std::size_t>(EGOSGM_EVIDENCE_STRIDE(size.width)) * blocks_.height),
       counts_(context, sums_.size()),
       drifts_(context, sums_.size()),

@@ -3,7 +3,6 @@
 
 #include "host/stages/banded_sgm.h"
 #include "host/stages/census.h"
-#include "host/stages/coarse_match.h"
 #include "kernels/method.h"
 
 namespace egosgm {
@@ -50,7 +49,7 @@ const char* to_string(Reason reason) {
 }
 
 Reasons::Bytes Reasons::repeats(ocl::Context& context, shared::ImageSize size) {
-  return Bytes(context, pixel_count(CoarseMatch::coarse_size(size)));
+  return Bytes(context, pixel_count(shared::coarse_size(size)));
 }
 
 Reasons::Reasons(ocl::Context& context, shared::ImageSize size, PixelType type, const MethodOptions& options,
@@ -71,7 +70,7 @@ void Reasons::explain(const Inputs& inputs, cl_int row_step, Bytes& reasons) {
   const ocl::Buffer<cl_ushort> no_runs(bytes.get(), 1);
   if (has_census_) {
     const ocl::Range each_block =
-        ocl::every_pixels(stage_.enter(), CoarseMatch::coarse_size(stage_.size()), stage_.pixels(), /*views=*/1);
+        ocl::every_pixels(stage_.enter(), shared::coarse_size(stage_.size()), stage_.pixels(), /*views=*/1);
     stage_.launch(find_repeats_, each_block, stage_.size(), disparities_, padding_, match.codes,
                   match.measured.disparity, repeats_);
   }

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/stages/textureless_regions.h"
 
-#include "host/stages/coarse_match.h"
 #include "kernels/method.h"
 
 namespace egosgm {
 
 TexturelessRegions::TexturelessRegions(ocl::Context& context, shared::ImageSize size, PixelType type, int pixels)
     : stage_(context, "TexturelessRegions", "textureless_regions.cl", size, pixels, pixel_define(type)),
-      blocks_(CoarseMatch::coarse_size(size)),
+      blocks_(shared::coarse_size(size)),
       labels_(context, ocl::Scratch::kOfStage0, 2 * pixel_count(blocks_)),
       counts_(context, ocl::Scratch::kOfStage1, 2 * 2 * (static_cast<std::size_t>(blocks_.width) + 1)),
       find_(stage_, "find_textureless"),

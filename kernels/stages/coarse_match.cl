@@ -25,15 +25,14 @@ typedef uint4 Means;
 
 // A work-item AT_ONCE neighbouring coarse pixels and view.
 KERNEL void shrink(const ImageSize size, global const uchar* images, global uchar* coarse_images) {
-  const int coarse_width = (size.width + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
-  const int coarse_height = (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
+  const ImageSize coarse = coarse_size(size);
   const int x = AT_ONCE * get_global_id(0);
   const int y = get_global_id(1);
   const int view = get_global_id(2);
-  if (x >= coarse_width) return;
+  if (x >= coarse.width) return;
 
   global const Pixel* image = (global const Pixel*)images + (size_t)view * size.height * size.width;
-  global ushort* to = (global ushort*)coarse_images + ((size_t)view * coarse_height + y) * coarse_width;
+  global ushort* to = (global ushort*)coarse_images + ((size_t)view * coarse.height + y) * coarse.width;
 #if PIXELS > 1
   if ((x + AT_ONCE) * EGOSGM_COARSE <= size.width) {
     ColumnSums columns = 0;
@@ -46,7 +45,7 @@ KERNEL void shrink(const ImageSize size, global const uchar* images, global ucha
     return;
   }
 #endif
-  for (int u = x; u < min(x + AT_ONCE, coarse_width); ++u) {
+  for (int u = x; u < min(x + AT_ONCE, coarse.width); ++u) {
     uint sum = 0;
     for (int v = 0; v < EGOSGM_COARSE; ++v) {
       global const Pixel* row = image + (size_t)min(y * EGOSGM_COARSE + v, size.height - 1) * size.width;

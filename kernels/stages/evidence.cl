@@ -133,8 +133,7 @@ COMPILED_ONCE void compare_row(const WorkItem at, const ImageSize size, const fl
                                global const uint* codes, const int has_coarse, const int coarse_padding,
                                global const uint* coarse_codes, global const uint* alike, global const float* predicted,
                                global const float* measured, global EvidenceSum* sums) {
-  const ImageSize blocks = {(size.width + EGOSGM_COARSE - 1) / EGOSGM_COARSE,
-                            (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE};
+  const ImageSize blocks = coarse_size(size);
   const int view = at.view, width = size.width;
   const int top = at.y * EGOSGM_COARSE, middle = top + EGOSGM_COARSE / 2;
   const int y = middle < size.height ? middle : top;
@@ -244,8 +243,7 @@ static inline void keep_least(BlockSums* least, const BlockSums part) {
 COMPILED_ONCE void gather_row(const WorkItem at, const ImageSize size, const int has_coarse, const int coarse_padding,
                               global const float* coarse, global const uint* alike, global const EvidenceSum* sums,
                               global int* evidence, global float* found) {
-  const ImageSize blocks = {(size.width + EGOSGM_COARSE - 1) / EGOSGM_COARSE,
-                            (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE};
+  const ImageSize blocks = coarse_size(size);
   const int radius = EGOSGM_EVIDENCE_RADIUS, width = blocks.width;
   const size_t row = (size_t)at.view * blocks.height + at.y, places = row * EGOSGM_EVIDENCE_STRIDE(size.width);
   const CodeRows alike_row = code_rows(alike, blocks, coarse_padding, at.view, at.y);

@@ -40,7 +40,7 @@ static inline void add_innovations(const Floats d, const Floats z, const float g
 COMPILED_ONCE void sum_innovations_of_row(const WorkItem at, const ImageSize size, const float gate,
                                           global const float* predicted, global const float* measured, global int* sums,
                                           global int* counts) {
-  const int width = size.width, blocks_high = (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
+  const int width = size.width, blocks_high = coarse_size(size).height;
   const int y = at.y * EGOSGM_COARSE, end = min(y + EGOSGM_COARSE, size.height);
   const size_t row_of_blocks = ((size_t)at.view * blocks_high + at.y) * EGOSGM_EVIDENCE_STRIDE(width);
   const int step = PIXELS == 1 ? EGOSGM_COARSE : PIXELS;
@@ -74,8 +74,7 @@ KERNEL void sum_innovations(const ImageSize size, const float gate, global const
 COMPILED_ONCE void drift_row(const WorkItem at, const ImageSize size, global const int* sums, global const int* counts,
                              global float* drifts) {
   const int radius = EGOSGM_DRIFT_RADIUS, stride = EGOSGM_EVIDENCE_STRIDE(size.width);
-  const int width = (size.width + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
-  const int height = (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
+  const int width = coarse_size(size).width, height = coarse_size(size).height;
   const size_t view = (size_t)at.view * height * stride;
   FOR_PIXELS(x, width) {
     Ints sum = 0, count = 0;
@@ -190,7 +189,7 @@ COMPILED_ONCE void update_row(const WorkItem at, const KalmanParameters q, globa
   const size_t view = (size_t)at.view * size.height * width;
   const size_t row = view + (size_t)y * width;
   const Ints is_plain = (Ints)(q.gate_px < INFINITY ? 0 : -1);
-  const int blocks_high = (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
+  const int blocks_high = coarse_size(size).height;
   const size_t row_of_blocks = ((size_t)at.view * blocks_high + y / EGOSGM_COARSE) * EGOSGM_EVIDENCE_STRIDE(size.width);
 
   FOR_CHUNKS(start, width) {

@@ -107,7 +107,7 @@ static inline Ints bits_apart_around(global const Code* own, global const Code* 
 COMPILED_ONCE void find_repeats_row(const WorkItem at, const ImageSize size, const int disparities, const int padding,
                                     global const uint* all_codes, global const float* measured, global uchar* repeats) {
   const int width = size.width, height = size.height;
-  const int columns = (width + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
+  const int columns = coarse_size(size).width;
   const int y = min(at.y * EGOSGM_COARSE + EGOSGM_COARSE / 2, height - 1);
   const long stride = width + 2 * (long)padding;
   global const Code* left = (global const Code*)all_codes + y * stride + padding;
@@ -191,7 +191,7 @@ COMPILED_ONCE void explain_row(const WorkItem at, const ImageSize size, const in
   const int y = at.y;
   const int width = size.width;
   const size_t row = (size_t)y * width, known = (size_t)(y - y % row_step) * width;
-  const int columns = (width + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
+  const int columns = coarse_size(size).width;
   global const uchar* repeats_of_blocks = repeats + (size_t)(y / EGOSGM_COARSE) * columns;
   global const int* evidence_of_blocks = block_evidence + (size_t)(y / EGOSGM_COARSE) * EGOSGM_EVIDENCE_STRIDE(width);
   const Floats jump = EGOSGM_UNCOVERED_JUMP_PX;

@@ -59,8 +59,7 @@ KERNEL void gather_blocks(const ImageSize size, const int row_step, global const
 COMPILED_ONCE void gather_coarse_block(const WorkItem at, const ImageSize size, global const float* coarse,
                                        global BlockRange* ranges) {
   const ImageSize blocks = blocks_of(size);
-  const int width = (size.width + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
-  const int height = (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
+  const int width = coarse_size(size).width, height = coarse_size(size).height;
   const int x = at.x, y = at.y, view = at.view;
   if (x >= blocks.width || y >= blocks.height) return;
 

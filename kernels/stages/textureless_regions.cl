@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Textureless regions that run out of the image at its top, as a sky does. Nothing bounds them there: what little of
-// them has a disparity, has that of the outlines beside it. So where fewer than half of a region's pixels have one,
-// none of them is published. A wall in the sun is filled from all of its sides, and stays.
+// TexturelessRegions leaves out what runs out of the image at its top without a texture, as a sky does. Nothing bounds
+// such a region there: what little of it has a disparity, has that of the outlines beside it. So where fewer than half
+// of its pixels have one, none of them is published. A wall in the sun is filled from all of its sides, and stays.
 //
-// A region is of blocks of EGOSGM_COARSE x EGOSGM_COARSE pixels that are connected by their sides. Its label is the
-// least column of its blocks at the top, counted from 1 on. Labels spread along columns and rows by turns, so many
-// times.
+// Textureless blocks of EGOSGM_COARSE x EGOSGM_COARSE pixels that touch by their sides are a region. Its label is the
+// least column of its blocks at the top, counted from 1 on. Labels spread along columns and rows by turns. A block that
+// they do not reach in EGOSGM_TEXTURELESS_SPREADS turns stays.
 #include "grey.h"
 #include "method.h"
 #include "pixels.h"
@@ -16,17 +16,11 @@
 #define TEXTURED 0
 #define UNREACHED 0xffff  // by a label
 
-static inline ImageSize size_in_blocks(const ImageSize size) {
-  const ImageSize blocks = {(size.width + EGOSGM_COARSE - 1) / EGOSGM_COARSE,
-                            (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE};
-  return blocks;
-}
-
 // The blocks of a row of them that a work-item takes.
 #define FOR_BLOCKS_OF_ROW(x, blocks) for (int x = at.x; x < (blocks).width; x += at.items)
 
-// Whether each of four blocks has no texture, by its least and largest grey value: -1 or 0. One that is black has none,
-// either, but is the edge of a rectified image.
+// Tells of each of four blocks whether it has no texture, by its least and largest grey value: -1 or 0. A black one has
+// none, either, but is the edge of a rectified image.
 static inline int4 are_textureless(const int4 least, const int4 largest) {
   return EGOSGM_TEXTURELESS_CONTRAST * (largest - least) < largest;
 }
@@ -44,7 +38,7 @@ static inline int block_is_textureless(const ImageSize size, global const Pixel*
 }
 
 #if PIXELS > 1
-// The same of four blocks side by side that lie within the image.
+// REQUIRES: four blocks side by side that lie within the image.
 static inline int4 four_are_textureless(const ImageSize size, global const Pixel* image, const int x, const int y) {
   Pixels least = load_grey(image + (size_t)y * size.width + x), largest = least;
   for (int v = y + 1; v < y + EGOSGM_COARSE; ++v) {
@@ -60,7 +54,7 @@ static inline int4 four_are_textureless(const ImageSize size, global const Pixel
 
 COMPILED_ONCE void find_in_row(const WorkItem at, const ImageSize size, global const uchar* images,
                                global ushort* labels) {
-  const ImageSize blocks = size_in_blocks(size);
+  const ImageSize blocks = coarse_size(size);
   global const Pixel* image = (global const Pixel*)images + (size_t)at.view * size.height * size.width;
   global ushort* row = labels + ((size_t)at.view * blocks.height + at.y) * blocks.width;
   FOR_BLOCKS_OF_ROW(x, blocks) {
@@ -78,7 +72,7 @@ COMPILED_ONCE void find_in_row(const WorkItem at, const ImageSize size, global c
   }
 }
 
-// A block a work-item, or a row of them.
+// A work-item takes a block, or a row of them.
 KERNEL void find_textureless(const ImageSize size, global const uchar* images, global ushort* labels) {
   find_in_row(THIS_WORK_ITEM, size, images, labels);
 }
@@ -91,7 +85,7 @@ static inline ushort spread_to(const ushort before, global ushort* label) {
   return min(before, own);
 }
 
-// Along a row of blocks (in_rows), or a column, and back. A row, or a column, a work-item and view.
+// Spreads labels along a row of blocks (in_rows), or a column, and back. A work-item takes one of a view.
 KERNEL void spread_labels(const ImageSize blocks, const int in_rows, global ushort* labels) {
   const int count = in_rows ? blocks.width : blocks.height, step = in_rows ? 1 : blocks.width;
   global ushort* line = labels + (size_t)get_global_id(1) * blocks.height * blocks.width +
@@ -112,7 +106,7 @@ static inline void add_counts(global int* counts, const ushort label, const int 
 
 COMPILED_ONCE void count_row(const WorkItem at, const ImageSize size, const int row_step, global const float* disparity,
                              global const ushort* labels, global int* counts) {
-  const ImageSize blocks = size_in_blocks(size);
+  const ImageSize blocks = coarse_size(size);
   global const float* view = disparity + (size_t)at.view * size.height * size.width;
   global const ushort* row = labels + ((size_t)at.view * blocks.height + at.y) * blocks.width;
   global int* of_view = counts + 2 * at.view * (blocks.width + 1);
@@ -136,7 +130,7 @@ COMPILED_ONCE void count_row(const WorkItem at, const ImageSize size, const int 
   add_counts(of_view, label, pixels, filled);
 }
 
-// Counts of each label, which are 0 before: its pixels, and those that have a disparity.
+// Counts the pixels of each label, and those that have a disparity. The counts are 0 before.
 KERNEL void count_filled(const ImageSize size, const int row_step, global const float* disparity,
                          global const ushort* labels, global int* counts) {
   count_row(THIS_WORK_ITEM, size, row_step, disparity, labels, counts);
@@ -144,7 +138,7 @@ KERNEL void count_filled(const ImageSize size, const int row_step, global const 
 
 COMPILED_ONCE void leave_out_of_row(const WorkItem at, const ImageSize size, const int row_step,
                                     global const ushort* labels, global const int* counts, global float* disparity) {
-  const ImageSize blocks = size_in_blocks(size);
+  const ImageSize blocks = coarse_size(size);
   global float* view = disparity + (size_t)at.view * size.height * size.width;
   global const ushort* row = labels + ((size_t)at.view * blocks.height + at.y) * blocks.width;
   global const int* of_view = counts + 2 * at.view * (blocks.width + 1);

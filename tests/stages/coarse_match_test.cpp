@@ -32,7 +32,7 @@ std::vector<float> run(shared::ImageSize size, const MethodOptions& options, con
                        PixelType type) {
   ocl::Context& context = testing::shared_context();
   CoarseMatch stage(context, size, options);
-  Map found(context, 2 * pixel_count(CoarseMatch::coarse_size(size)));
+  Map found(context, 2 * pixel_count(shared::coarse_size(size)));
   stage.prepare(type);
   stage.match(testing::images_of(context, images, type), found);
   return found.read(context);
@@ -56,8 +56,7 @@ TEST_P(CoarseMatchTest, EqualsReference) {
     options.disparities = count;
     const std::vector<int> images = blotches(size, 12, bits);
     EXPECT_TRUE(testing::same_bits(run(size, options, images, type),
-                                   reference::coarse_match(size, options, images, bits),
-                                   CoarseMatch::coarse_size(size)));
+                                   reference::coarse_match(size, options, images, bits), shared::coarse_size(size)));
   }
 }
 

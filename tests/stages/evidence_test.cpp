@@ -30,11 +30,11 @@ struct Images {
   std::vector<std::uint16_t> full[2], coarse[2];
 
   explicit Images(shared::ImageSize size) : size(size) {
-    const shared::ImageSize quarter = CoarseMatch::coarse_size(size);
+    const shared::ImageSize quarter = shared::coarse_size(size);
     for (int view = 0; view < 2; ++view)
       full[view].resize(pixel_count(size)), coarse[view].resize(pixel_count(quarter));
   }
-  shared::ImageSize coarse_size() const { return CoarseMatch::coarse_size(size); }
+  shared::ImageSize coarse_size() const { return shared::coarse_size(size); }
 
   reference::ViewCodes codes() const {
     return {size,
