@@ -96,10 +96,14 @@ KERNEL void spread_labels(const ImageSize blocks, const int in_rows, global usho
   for (int i = count - 1; i >= 0; --i) before = spread_to(before, line + (size_t)i * step);
 }
 
-static inline int has_label(const ushort label) { return label != TEXTURED && label != UNREACHED; }
+// Whether a block has the label of a column. One that is none of them, as after a failed command, counts nowhere.
+static inline int has_label(const ImageSize blocks, const ushort label) {
+  return label != TEXTURED && label <= blocks.width;
+}
 
-static inline void add_counts(global int* counts, const ushort label, const int pixels, const int filled) {
-  if (!has_label(label)) return;
+static inline void add_counts(const ImageSize blocks, global int* counts, const ushort label, const int pixels,
+                              const int filled) {
+  if (!has_label(blocks, label)) return;
   atomic_add(&counts[2 * label], pixels);
   atomic_add(&counts[2 * label + 1], filled);
 }
@@ -114,12 +118,12 @@ COMPILED_ONCE void count_row(const WorkItem at, const ImageSize size, const int 
   int pixels = 0, filled = 0;
   FOR_BLOCKS_OF_ROW(x, blocks) {
     if (row[x] != label) {
-      add_counts(of_view, label, pixels, filled);
+      add_counts(blocks, of_view, label, pixels, filled);
       label = row[x];
       pixels = 0;
       filled = 0;
     }
-    if (!has_label(label)) continue;
+    if (!has_label(blocks, label)) continue;
     for (int v = EGOSGM_COARSE * at.y; v < min(EGOSGM_COARSE * (at.y + 1), size.height); ++v) {
       for (int u = EGOSGM_COARSE * x; u < min(EGOSGM_COARSE * (x + 1), size.width) && v % row_step == 0; ++u) {
         ++pixels;
@@ -127,7 +131,7 @@ COMPILED_ONCE void count_row(const WorkItem at, const ImageSize size, const int 
       }
     }
   }
-  add_counts(of_view, label, pixels, filled);
+  add_counts(blocks, of_view, label, pixels, filled);
 }
 
 // Counts the pixels of each label, and those that have a disparity. The counts are 0 before.
@@ -144,7 +148,7 @@ COMPILED_ONCE void leave_out_of_row(const WorkItem at, const ImageSize size, con
   global const int* of_view = counts + 2 * at.view * (blocks.width + 1);
   FOR_BLOCKS_OF_ROW(x, blocks) {
     const ushort label = row[x];
-    if (!has_label(label) || 2 * of_view[2 * label + 1] >= of_view[2 * label]) continue;
+    if (!has_label(blocks, label) || 2 * of_view[2 * label + 1] >= of_view[2 * label]) continue;
     for (int v = EGOSGM_COARSE * at.y; v < min(EGOSGM_COARSE * (at.y + 1), size.height); ++v) {
       for (int u = EGOSGM_COARSE * x; u < min(EGOSGM_COARSE * (x + 1), size.width) && v % row_step == 0; ++u) {
         view[(size_t)v * size.width + u] = EGOSGM_INVALID_DISPARITY;
