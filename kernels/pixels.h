@@ -15,18 +15,24 @@
 #if PIXELS == 1
 typedef float Floats;
 typedef int Ints;
+typedef short Shorts;
 typedef uint Uints;
 #define FLOATS_OF_INTS convert_float
 #define INTS_OF_FLOATS convert_int
 #define INTS_OF_UINTS as_int
+#define INTS_OF_SHORTS convert_int
+#define SHORTS_OF_INTS convert_short
 #define LANE_INDICES 0
 #else
 typedef float16 Floats;
 typedef int16 Ints;
+typedef short16 Shorts;
 typedef uint16 Uints;
 #define FLOATS_OF_INTS convert_float16
 #define INTS_OF_FLOATS convert_int16
 #define INTS_OF_UINTS as_int16
+#define INTS_OF_SHORTS convert_int16
+#define SHORTS_OF_INTS convert_short16
 #define LANE_INDICES (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
 #endif
 

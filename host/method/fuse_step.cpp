@@ -12,7 +12,9 @@ FuseStep::FuseStep(ocl::Context& context, shared::ImageSize size, const MethodOp
   if (Evidence::is_of(options)) evidence_.emplace(context, size, options);
   if (!options.track_right) right_map_.emplace(context, size, range_of(options));
   if (options.median_filter.enabled)
-    weighted_median_.emplace([&context, size](PixelType type) { return WeightedMedian(context, size, type); });
+    weighted_median_.emplace([&context, size, range = range_of(options)](PixelType type) {
+      return WeightedMedian(context, size, type, range);
+    });
   if (options.sad_check.max_difference > 0) {
     sad_check_.emplace(
         [&context, size, check = options.sad_check](PixelType type) { return SadCheck(context, size, type, check); });

@@ -12,18 +12,21 @@ namespace egosgm {
 /// beyond, ICCV 2013).
 class WeightedMedian {
  public:
-  /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
-  WeightedMedian(ocl::Context& context, shared::ImageSize size, PixelType type, int pixels = 0);
+  /// `range`: of the disparities. `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
+  WeightedMedian(ocl::Context& context, shared::ImageSize size, PixelType type, shared::DisparityRange range,
+                 int pixels = 0);
 
-  /// A pixel without a disparity takes the median of the others, with a variance of 1 px^2, if at least six of the
-  /// eight have a value and are about as bright. `images`: the pixels of both views without padding, the left view
-  /// first.
+  /// Votes that are less than a step apart count as equal, and the pixel's own is the first of these. A step is so
+  /// short that 16 bits hold the range: 1/128 px of 128 disparities. A pixel without a disparity takes the median of
+  /// the others, with a variance of 1 px^2, if at least six of the eight have a value and are about as bright.
+  /// `images`: the pixels of both views without padding, the left view first.
   void filter(const ocl::Buffer<cl_uchar>& images, const Map& disparity, Map& filtered, Map& variance, Views views);
 
  private:
   ocl::Stage stage_;
-  ocl::Kernel<const shared::ImageSize, const cl_int, const ocl::Buffer<cl_uchar>, const ocl::Buffer<float>,
-              ocl::Buffer<float>, ocl::Buffer<float>>
+  const float least_, steps_per_px_;
+  ocl::Kernel<const shared::ImageSize, const cl_int, const float, const float, const ocl::Buffer<cl_uchar>,
+              const ocl::Buffer<float>, ocl::Buffer<float>, ocl::Buffer<float>>
       weigh_;
 };
 

@@ -27,11 +27,11 @@ COMPILED_ONCE void penalties_row(const WorkItem at, const ImageSize size, const 
   global const Pixel* above = here - (y >= row_step ? row_step * width : 0);
 
   FOR_PIXELS(x, width) {
-    const Ints grey = grey_at(here, x, width);
-    const Ints left = penalty(most, least, slope, grey, grey_at(here, x - 1, width));
-    const Ints up = penalty(most, least, slope, grey, grey_at(above, x, width));
-    const Ints upper_left = penalty(most, least, slope, grey, grey_at(above, x - 1, width));
-    const Ints upper_right = penalty(most, least, slope, grey, grey_at(above, x + 1, width));
+    const Ints grey = INTS_OF_SHORTS(grey_at(here, x, width));
+    const Ints left = penalty(most, least, slope, grey, INTS_OF_SHORTS(grey_at(here, x - 1, width)));
+    const Ints up = penalty(most, least, slope, grey, INTS_OF_SHORTS(grey_at(above, x, width)));
+    const Ints upper_left = penalty(most, least, slope, grey, INTS_OF_SHORTS(grey_at(above, x - 1, width)));
+    const Ints upper_right = penalty(most, least, slope, grey, INTS_OF_SHORTS(grey_at(above, x + 1, width)));
     store_words(left | up << 8 | upper_left << 16 | upper_right << 24, steps + 4 * row, x, width);
   }
 }

@@ -237,7 +237,7 @@ void Pipeline::update(const Images& images, bool stands, Frame& frame) const {
   frame.fused = kalman_update(size_, options_.kalman_update, predicted, pass.measured, evidence ? &*evidence : nullptr);
   frame.fused = without_absent_rows(size_, step, frame.fused);
   frame.fused_smoothed =
-      options_.median_filter.enabled ? weighted_median(size_, pass.greys, frame.fused, step) : frame.fused;
+      options_.median_filter.enabled ? weighted_median(size_, range_, pass.greys, frame.fused, step) : frame.fused;
   if (!options_.track_right) {
     frame.fused_smoothed =
         right_map(size_, range_.min, options_.consistency.update_px, pass.measured, frame.fused_smoothed);

@@ -15,10 +15,12 @@ namespace {
 using testing::HostMaps;
 using testing::kNone;
 
+constexpr shared::DisparityRange kRange{-40, 128};
+
 HostMaps filter(shared::ImageSize size, PixelType type, const std::vector<std::uint16_t>& images, const HostMaps& in,
-                int pixels = 0, Views views = Views::kBoth) {
+                int pixels = 0, Views views = Views::kBoth, shared::DisparityRange range = kRange) {
   ocl::Context& context = testing::shared_context();
-  WeightedMedian stage(context, size, type, pixels);
+  WeightedMedian stage(context, size, type, range, pixels);
   StereoMaps maps = testing::upload(context, size, in);
   Map filtered = testing::upload(context, size, testing::earlier_maps(size)).disparity;
   stage.filter(testing::images_of(context, images, type).pixels, maps.disparity, filtered, maps.variance, views);
@@ -47,7 +49,7 @@ TEST_P(WeightedMedianTest, EqualsReference) {
           {testing::earlier_maps(size).disparity, testing::upload(context, size, maps).variance.read(context)});
       testing::expect_reference(
           size, before, [&](int pixels, Views views) { return filter(size, type, images, maps, pixels, views); },
-          [&](int step) { return reference::weighted_median(size, greys, maps, step); });
+          [&](int step) { return reference::weighted_median(size, kRange, greys, maps, step); });
     }
   }
 }
@@ -62,8 +64,8 @@ struct Circle {
   explicit Circle(const std::vector<float>& disparities) {
     for (std::size_t i = 0; i < 9; ++i) maps.disparity[kVotes[i]] = maps.disparity[81 + kVotes[i]] = disparities[i];
   }
-  float middle(float expected_variance = 0.25f) const {
-    const HostMaps found = filter(kSize, PixelType::kU8, greys, maps);
+  float middle(float expected_variance = 0.25f, shared::DisparityRange range = kRange) const {
+    const HostMaps found = filter(kSize, PixelType::kU8, greys, maps, 0, Views::kBoth, range);
     EXPECT_EQ(found.variance[40], found.disparity[40] == kNone ? 0.0f : expected_variance);
     EXPECT_EQ(found.disparity[81 + 40], found.disparity[40]);
     return found.disparity[40];
@@ -90,6 +92,17 @@ TEST(WeightedMedian, FillsAHoleForWhichSixVote) {
   Circle beside_an_edge({1, 2, 3, kNone, kNone, kNone, 4, 5, 6});
   beside_an_edge.greys[4] = beside_an_edge.greys[81 + 4] = 148;
   EXPECT_EQ(beside_an_edge.middle(), kNone);
+}
+
+TEST(WeightedMedian, OrdersTheLongestRange) {
+  constexpr shared::DisparityRange kLongest{-16384, 4096};
+  Circle circle({-16384, -12289, -15000, -13000, -14000.5f, -14001, -14000, -16000, -12500});
+  EXPECT_EQ(circle.middle(0.25f, kLongest), -14000.5f);
+}
+
+TEST(WeightedMedian, PrefersThePixelsOwnAmongVotesWithinAStep) {
+  EXPECT_EQ(Circle({2, 1.001f, 2, 1.002f, 1.003f, 1.004f, 0, 0, 0}).middle(), 1.003f);
+  EXPECT_EQ(Circle({2, 2, 2, 1.002f, 1, 1.001f, 0, 0, 0}).middle(), 1);
 }
 
 }  // namespace
