@@ -18,6 +18,7 @@
 #include <thread>
 #include <utility>
 
+#include "egosgm/named_options.h"
 #include "egosgm/odometry.h"
 #include "egosgm/pipeline.h"
 #include "egosgm/vision/calibration_io.h"
@@ -34,7 +35,7 @@ class NewestFrame {
  public:
   explicit NewestFrame(const std::string& source) {
     const bool camera = source.find_first_not_of("0123456789") == std::string::npos;
-    if (!(camera ? video_.open(std::stoi(source)) : video_.open(source))) {
+    if (!(camera ? video_.open(static_cast<int>(std::strtol(source.c_str(), nullptr, 10))) : video_.open(source))) {
       throw std::invalid_argument(source + ": no camera or video that OpenCV can open");
     }
     if (!camera) seconds_per_frame_ = 1 / std::max(1.0, video_.get(cv::CAP_PROP_FPS));
@@ -141,7 +142,7 @@ void run(const std::string& source, const egosgm::Calibration& calibration, cons
 int main(int argc, char** argv) try {
   if (argc < 3) return std::fprintf(stderr, "usage: camera NUMBER|VIDEO CALIBRATION [DISPARITIES]\n"), 2;
   egosgm::PipelineOptions options;
-  if (argc > 3) options.disparities = std::stoi(argv[3]);
+  if (argc > 3) egosgm::set_option(options, "disparities", argv[3]);
   run(argv[1], egosgm::vision::read_calibration(argv[2]), options);
 } catch (const std::exception& error) {
   std::fprintf(stderr, "camera: %s\n", error.what());

@@ -55,7 +55,7 @@ class Scripts(unittest.TestCase):
                 for arguments in (["--progam"], ["--progam=1"], ["-q"])]
         rows += [(SCRIPTS / name, words, words[-1]) for name, *words in (
             ("install-dependencies", "--program", "again"), ("tidy", "host/nowhere.cpp"), ("mutants", "no such text"), ("test", "Census"), ("test", "--all", "Census"), ("test", "-R", "Census", "Sgm"), ("format", "--check", "all"), ("measure", "--build", "b", "c"), ("build-site", "now"),
-            ("try-arm", "now"), ("lanes", "asan", "usan"), ("build-wheel", "python9.9"))]
+            ("try-arm", "now"), ("lanes", "asan", "usan"), ("build-wheel", "python9.9"), ("bench-device", "--all", "stages"))]
         for script, arguments, named in rows:
             with self.subTest(script=script.name, arguments=arguments):
                 done = self.called(script, *arguments)

@@ -54,3 +54,7 @@ class Camera(InputTest):
             done = self.run_camera(*arguments)
             self.assertNotEqual(done.returncode, 0, arguments)
             self.assertTrue(done.stderr)
+
+    def test_a_number_that_is_none_is_named(self):
+        for source, disparities, named in ((self.video(1), "many", '"many" is not a whole number'), (10**20, "64", f"{10**20}: no camera")):
+            self.assertIn(named, self.run_camera(source, self.street / "calib.txt", disparities).stderr)
