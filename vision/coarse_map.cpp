@@ -62,7 +62,7 @@ int slope_at(const Image& image, int x, int y) {
 /// The coarse map of images of bytes.
 Image coarse_map_of(const Image& left, const Image& right, double row_offset_px, int least, int end) {
   const int factor = std::max(1, (std::max(left.cols, left.rows) + kCoarseSide - 1) / kCoarseSide);
-  const Size size(left.cols / factor, left.rows / factor);
+  const Size size{left.cols / factor, left.rows / factor};
   Image map(std::max(size.height, 0), std::max(size.width, 0), kF32, kNoValue);
   if (size.width < 32 || size.height < 16) return map;
   const int half = (size.width / 2 + 15) / 16 * 16;
