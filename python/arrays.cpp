@@ -31,9 +31,6 @@ py::array as_array(const py::object& object, const std::string& name, const char
   return array;
 }
 
-// Asked of NumPy: pybind11 before 2.12 does not know where NumPy 2 keeps it.
-py::ssize_t element_bytes(const py::array& array) { return array.attr("itemsize").cast<py::ssize_t>(); }
-
 bool rows_are_contiguous(const py::array& array) {
   return array.shape(1) < 2 || array.strides(1) == element_bytes(array);
 }
@@ -97,6 +94,8 @@ py::array grey_of(const py::array& colour) {
 }
 
 }  // namespace
+
+py::ssize_t element_bytes(const py::array& array) { return array.attr("itemsize").cast<py::ssize_t>(); }
 
 ImageArray image_of(const py::object& image, const char* name) {
   constexpr const char* kWanted = "a grey image, H x W of uint8 or uint16, or a colour one, H x W x 3 or 4, RGB";

@@ -18,6 +18,9 @@ namespace egosgm::python {
 
 namespace py = pybind11;
 
+/// Asked of NumPy: the itemsize() of pybind11 before 2.12 does not know where NumPy 2 keeps it.
+py::ssize_t element_bytes(const py::array& array);
+
 /// A view, and what keeps its memory alive.
 struct ImageArray {
   py::array array;

@@ -37,7 +37,7 @@ struct Stored<vision::Image> {  // kU8, kF32 or kFlow
   static py::object of(const vision::Image& value) { return array_of(value); }
   static vision::Image from(const py::handle& stored) {
     const auto array = stored.cast<py::array>();
-    const bool bytes = array.itemsize() == 1;
+    const bool bytes = element_bytes(array) == 1;
     vision::Image image(static_cast<int>(array.shape(0)), static_cast<int>(array.shape(1)),
                         bytes               ? vision::kU8
                         : array.ndim() == 2 ? vision::kF32
