@@ -70,7 +70,7 @@ KERNEL void sum_innovations(const ImageSize size, const float gate, global const
 }
 
 // The drift of blocks: the mean over a window of blocks, and 0 where few have both values, the mean is small, or less
-// than three fifths are off to its side.
+// than three quarters are off to its side.
 COMPILED_ONCE void drift_row(const WorkItem at, const ImageSize size, global const int* sums, global const int* counts,
                              global float* drifts) {
   const int radius = EGOSGM_DRIFT_RADIUS, stride = EGOSGM_EVIDENCE_STRIDE(size.width);
@@ -91,7 +91,7 @@ COMPILED_ONCE void drift_row(const WorkItem at, const ImageSize size, global con
     const Floats steps = EGOSGM_DRIFT_STEPS_PER_PX;
     const Floats mean = FLOATS_OF_INTS(sum) / (steps * FLOATS_OF_INTS(max(all, (Ints)(1))));
     const Ints is_drift =
-        (all >= EGOSGM_DRIFT_LEAST_COUNT) & (5 * off >= 3 * all) & (fabs(mean) > (Floats)(EGOSGM_LEAST_DRIFT_PX));
+        (all >= EGOSGM_DRIFT_LEAST_COUNT) & (4 * off >= 3 * all) & (fabs(mean) > (Floats)(EGOSGM_LEAST_DRIFT_PX));
     store_pixels(is_drift ? mean : (Floats)(0.0f), drifts + view + (size_t)at.y * stride, x, width);
   }
 }

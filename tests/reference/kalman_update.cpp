@@ -44,7 +44,7 @@ float drift_around(shared::ImageSize size, const testing::HostMaps& predicted, c
   }
   if (count < 60) return 0;
   const float mean = static_cast<float>(sum) / (256.0f * static_cast<float>(count));
-  const bool most_are_off = 5 * (mean > 0 ? nearer : farther) >= 3 * count;
+  const bool most_are_off = 4 * (mean > 0 ? nearer : farther) >= 3 * count;
   return most_are_off && std::abs(mean) > 0.1f ? mean : 0;
 }
 

@@ -205,8 +205,8 @@ TEST(KalmanUpdate, MovesThePredictionOfWhatMovesByItself) {
     EXPECT_EQ(Window(sign * 0.5f, 20).middle().disparity, 20) << "no farther than to the measurement";
     EXPECT_EQ(Window(sign * 25 / 256, 20).middle(), drifted(0, 20)) << "too little";
   }
-  EXPECT_EQ(Window(0.5f, 21).with(80, 20).middle(), drifted(0.3f, 21)) << "three fifths";
-  EXPECT_EQ(Window(0.5f, 21).with(81, 20).middle(), drifted(0, 21)) << "fewer";
+  EXPECT_EQ(Window(0.5f, 21).with(50, 20).middle(), drifted(0.375f, 21)) << "three quarters";
+  EXPECT_EQ(Window(0.5f, 21).with(51, 20).middle(), drifted(0, 21)) << "fewer";
   EXPECT_EQ(Window(0.5f, 21).with(100, 19.5f).middle(), drifted(0, 21)) << "to both sides";
   EXPECT_EQ(Window(0.5f, 21).with(100, 20 + 12.0f / 256).middle(), drifted(0, 21)) << "half are hardly off";
   EXPECT_EQ(Window(0.5f, 21).with(140, 28).middle(), drifted(0.5f, 21)) << "60 agree within the gate";
