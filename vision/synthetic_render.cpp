@@ -254,7 +254,7 @@ struct ViewMaps {
 void render_view(const View& view, const View& other, int towards_other, const std::vector<Solid>& solids,
                  const SyntheticOptions& options, uint32_t noise_seed, ViewMaps out) {
   const Camera& camera = view.camera();
-  const Size size(camera.width, camera.height);
+  const Size size{camera.width, camera.height};
   const double numerator = camera.focal_px * kBaseline_m,
                gain = options.exposure * (towards_other > 0 ? kRightGain : 1);
   out.image.create(size, kU8), out.disparity.create(size, kF32);
@@ -338,7 +338,7 @@ void find_scene_flow(const Street& street, int frame, SyntheticSceneFlow& out) {
   const double numerator = camera.focal_px * kBaseline_m;
   const Isometry of_camera = next.world_from_camera.inverse() * camera.world_from_camera;
   std::map<int, SyntheticObject> objects = find_objects(solids, next_solids, camera, next);
-  const Size size(camera.width, camera.height);
+  const Size size{camera.width, camera.height};
   out.flow = Image(size, kFlow, std::numeric_limits<float>::quiet_NaN());
   out.next_disparity = Image(size, kF32, kInvalidDisparity);
   out.seen_next = Image(size, kU8, 0), out.objects = Image(size, kU8, 0);

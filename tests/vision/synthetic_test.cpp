@@ -385,7 +385,7 @@ TEST(Synthetic, AnySizeRenders) {
   for (const auto& [width, height] : {std::pair{1, 1}, {1, 5}, {7, 1}, {7, 5}, {65, 3}, {33, 127}}) {
     const SyntheticFrame frame =
         SyntheticSequence({.frames = 2, .width = width, .height = height, .moving_object = true}).render(1);
-    const Size size(width, height);
+    const Size size{width, height};
     EXPECT_EQ(frame.left.size(), size);
     EXPECT_EQ(frame.right_noc.size(), size);
     for (const double d : values_of(frame.left_disparity)) {
