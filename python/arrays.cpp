@@ -131,6 +131,11 @@ vision::Image map_of(const py::object& map, const char* name, py::array& keep) {
   if (keep.ndim() != 2 || keep.size() == 0) {
     throw InvalidArgument(std::string(name) + " is " + shape_of(keep) + ": give an H x W map of float32");
   }
+  if (keep.dtype().equal(py::dtype::of<std::int16_t>())) {
+    throw InvalidArgument(std::string(name) + " is " + shape_of(keep) +
+                          ", which matchers of OpenCV's form give with 16 steps a pixel: give it divided by 16, as "
+                          "float32, with egosgm.INVALID_DISPARITY where there is no disparity");
+  }
   expect_indexable(keep, name);
   if (!keep.dtype().equal(py::dtype::of<float>())) {
     py::object floats = py::module_::import("numpy").attr("asarray")(keep, py::dtype::of<float>());

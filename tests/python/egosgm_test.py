@@ -237,6 +237,11 @@ def test_metrics_and_pictures(frames, street):
     for compare in (egosgm.compare_disparity, lambda estimate, truth: egosgm.evaluate_video([estimate], [truth])):
         expect_refused("truths?:? has a mask", lambda: compare(wrong, masked))
         compare(wrong, masked.filled(egosgm.INVALID_DISPARITY))
+    sixteenths = (16 * truth).astype(np.int16)  # as egosgm.Matcher and OpenCV's matchers give it
+    for read in (lambda: egosgm.depth_from_disparity(sixteenths, street.calibration), lambda: egosgm.compare_disparity(sixteenths, truth),
+                 lambda: egosgm.evaluate_video([sixteenths], [truth]), lambda: egosgm.evaluate_video([truth], [sixteenths]),
+                 lambda: egosgm.evaluate_scene_flow([(sixteenths, truth, np.zeros((HEIGHT, WIDTH, 2)))], [(truth, truth, np.zeros((HEIGHT, WIDTH, 2)))])):
+        expect_refused("int16, .* 16 steps a pixel: give it divided by 16", read)
     sky = egosgm.compare_disparity(wrong, np.zeros_like(truth))
     assert sky.sky == sky.sky_valid == truth.size and sky.metrics.wrong_of_all == sky.metrics.filled == 100
     poses = np.stack([street.render(i).world_from_camera for i in range(FRAMES)])

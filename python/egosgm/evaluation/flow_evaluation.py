@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import _egosgm
-from .video_counts import BAD_PX, flow_of, is_sky, is_valid, map_of, size_text
+from .video_counts import BAD_PX, disparity_of, flow_of, is_sky, is_valid, map_of, size_text
 from .video_evaluation import percent
 
 MEASURES = ("d1", "d2", "fl", "sf")
@@ -101,7 +101,7 @@ def evaluation_of(counts: Sequence[_Counts], objects: Optional[ObjectCounts] = N
 def _maps_of(item: Any, name: str) -> List[np.ndarray]:
     if len(item) != 3:
         raise _egosgm.InvalidArgument(f"{name}: {len(item)} maps of a frame: give its disparity, that in the next frame, and its flow")
-    disparities = [map_of(each, name) for each in item[:2]]
+    disparities = [disparity_of(each, name) for each in item[:2]]
     return [*(np.where(is_valid(each), each, np.float32(np.nan))[..., None] for each in disparities), flow_of(item[2], name)]
 
 

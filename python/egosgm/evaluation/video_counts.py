@@ -110,7 +110,7 @@ def move(disparity: np.ndarray, calibration: Any, motion: np.ndarray) -> Tuple[n
 
 def move_map(disparity: ArrayLike, calibration: Any, current_from_previous: ArrayLike) -> np.ndarray:
     """A disparity map as the next frame sees it, the nearest surface on top; INVALID_DISPARITY where nothing lies."""
-    before = map_of(disparity, "disparity")
+    before = disparity_of(disparity, "disparity")
     inside, place, there = move(before, calibration, poses_of([current_from_previous], "current_from_previous")[0])
     with np.errstate(invalid="ignore"):
         inside &= there > _NONE
@@ -405,6 +405,14 @@ def map_of(item: Any, name: str) -> np.ndarray:
     if array.ndim != 2 or not array.size:
         raise _egosgm.InvalidArgument(f"{name}: an array of shape {array.shape}: give H x W arrays")
     return np.where(np.isfinite(array), array, np.float32(np.nan))
+
+
+def disparity_of(item: Any, name: str) -> np.ndarray:
+    array = np.asanyarray(item)
+    if array.dtype == np.int16:
+        raise _egosgm.InvalidArgument(f"{name}: an array of int16, which matchers of OpenCV's form give with 16 steps a pixel: give it divided by 16, as float32, "
+                                      "with egosgm.INVALID_DISPARITY where there is no disparity")
+    return map_of(array, name)
 
 
 def flow_of(item: Any, name: str) -> np.ndarray:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from .. import _egosgm
 from .pose_evaluation import inverse, poses_of
-from .video_counts import DENSITIES, SHARES, Counts, Frame, VideoCounts, count_frames, flow_of, map_of, size_text
+from .video_counts import DENSITIES, SHARES, Counts, Frame, VideoCounts, count_frames, disparity_of, flow_of, map_of, size_text
 
 _Maps = Optional[Sequence[Optional[ArrayLike]]]
 
@@ -210,8 +210,8 @@ def evaluate_video(estimates: Sequence[ArrayLike], truths: _Maps = None, *, cali
     if poses is not None and (calibration is None or len(poses) != number):
         raise _egosgm.InvalidArgument(f"world_from_camera has {len(poses)} poses of {number} frames{'' if calibration else ' and no calibration'}: "
                                       "give one for each frame, with the calibration")
-    sources = {"truth": (truths, "truths", map_of), "all_truth": (all_truths, "all_truths", map_of), "against": (against, "against", map_of),
-               "uncertainty": (uncertainties, "uncertainties", map_of), "next_truth": (next_truths, "next_truths", map_of),
+    sources = {"truth": (truths, "truths", disparity_of), "all_truth": (all_truths, "all_truths", disparity_of), "against": (against, "against", disparity_of),
+               "uncertainty": (uncertainties, "uncertainties", map_of), "next_truth": (next_truths, "next_truths", disparity_of),
                "moving": (moving, "moving", _mask_of), "image": (images, "images", _grey_of), "reason": (reasons, "reasons", _grey_of),
                "flow_to_next": (flows, "flows", flow_of)}
     for items, name, _ in sources.values():
@@ -219,7 +219,7 @@ def evaluate_video(estimates: Sequence[ArrayLike], truths: _Maps = None, *, cali
             raise _egosgm.InvalidArgument(f"{name} has {len(items)} of {number} frames: give one for each estimate, None where there is none")
 
     def frame(i: int) -> Frame:
-        now = Frame(map_of(estimates[i], "estimates"))
+        now = Frame(disparity_of(estimates[i], "estimates"))
         for field, (items, name, convert) in sources.items():
             item = None if items is None else items[i]
             if item is None:
