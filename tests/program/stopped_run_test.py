@@ -64,6 +64,29 @@ class Disk(LongRuns):
             self.assertTrue(1 <= len(report["frames"]) < self.LONG)
             self.assertEqual(len((out / "poses.txt").read_text().splitlines()), len(report["frames"]))
 
+    def test_a_signal_that_comes_twice_is_one_interrupt_and_a_later_one_ends_the_program(self):
+        """`timeout` sends its signal to the program, and then to the program's process group."""
+        street, out = self.long_street(), self.new_folder()
+        process = self.start(street, out)
+        for _ in range(2):
+            process.send_signal(signal.SIGTERM)
+            time.sleep(0.02)  # or both are one to the kernel
+        _, errors = process.communicate(timeout=900)
+        self.assertEqual(process.returncode, 130, errors)
+        self.assertTrue(self.report(out)["frames"])
+
+        street = self.broken_street()
+        pipe = street / "image_0/000003.png"
+        pipe.unlink()
+        os.mkfifo(pipe)
+        process = subprocess.Popen([PROGRAM, "run", street, "--out", out / "waits"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        writing = os.open(pipe, os.O_WRONLY)  # once it looks at the images' sizes: it waits for this one
+        for _ in range(2):
+            process.send_signal(signal.SIGTERM)
+            time.sleep(0.7)
+        self.assertEqual(process.wait(600), -signal.SIGTERM)
+        os.close(writing)
+
     def test_an_interrupt_loses_no_frame_that_was_only_read(self):
         """On a GPU the next frame is read while this one is told of; here by a layer that names the device so. The interrupt breaks off a write to
         a reader that waits, once a compiler has run, as here with an empty cache."""
