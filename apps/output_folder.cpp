@@ -85,8 +85,17 @@ std::set<std::string> folders_of(const std::set<std::string>& files) {
   return folders;
 }
 
+/// Where a shell left it, as in --out=~/result.
+void expect_no_home_sign(const std::string& option, const fs::path& path) {
+  std::error_code none;
+  if (path.empty() || *path.begin() != "~" || fs::exists("~", none)) return;
+  throw InvalidArgument(option + " " + path.string() +
+                        ": a shell alone knows ~ as the home folder: write its path out");
+}
+
 void expect_named(const std::string& option, const std::string& path) {
   if (path.empty()) throw InvalidArgument(option + " \"\": give a name");
+  expect_no_home_sign(option, path);
 }
 
 /// Names of the frames whose pairs an earlier run could not read.
@@ -125,6 +134,7 @@ fs::path new_folder(const std::string& option, const std::string& folder) {
 }
 
 void expect_no_folder(const std::string& option, const fs::path& file) {
+  expect_no_home_sign(option, file);
   std::error_code none;
   if (!file.has_filename() || fs::is_directory(file, none))
     throw InvalidArgument(option + " " + file.string() + ": is a folder: give the name of a file");

@@ -27,6 +27,8 @@ COMMANDS = (
     ("compile --out {never} --clang clang", "--clang", "--il"), ("compile --out {never} --llvm-spirv llvm-spirv", "--llvm-spirv", "--il"),
     ("run --out {never} -- {street} more", "more than one input", "and more"),
     ("run --odometry {street} --out ''", "--out", "is empty"),
+    ("run {street} --out=~/out", "--out ~/out: a shell alone knows ~"), ("synth --out=~/out", "--out ~/out: a shell alone knows ~"),
+    ("odometry {street} --out=~/out/poses.txt", "--out ~/out/poses.txt: a shell alone knows ~"),
     ("run {street} --out --quiet", "--out: its value is missing", "--quiet is an option"),
     ("run {street} --poses --out never", "--poses: its value is missing, as --out is an option"), ("synth --out -h", "--out: its value is missing"),
     ("run 'no\nway\x1b[31m\r' --out {never}", "no way [31m : no such folder"),
