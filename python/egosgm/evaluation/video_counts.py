@@ -409,6 +409,8 @@ def map_of(item: Any, name: str) -> np.ndarray:
 
 def disparity_of(item: Any, name: str) -> np.ndarray:
     array = np.asanyarray(item)
+    if array.shape == () and array.dtype == object:
+        raise _egosgm.InvalidArgument(f"{name}: a {type(item).__name__} in place of a map: give H x W arrays, such as the disparity of a frame")
     if array.dtype == np.int16:
         raise _egosgm.InvalidArgument(f"{name}: an array of int16, which matchers of OpenCV's form give with 16 steps a pixel: give it divided by 16, as float32, "
                                       "with egosgm.INVALID_DISPARITY where there is no disparity")
