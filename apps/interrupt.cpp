@@ -1,41 +1,31 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/interrupt.h"
 
+#include <unistd.h>
+
 #include <atomic>
 #include <csignal>
-#include <cstdint>
-#include <ctime>
 
 namespace egosgm::app {
 namespace {
 
-/// `timeout` sends its signal to the program, and once more to all that the program belongs to.
-constexpr std::int64_t kTogetherMs = 500;
-
 std::atomic<bool> flag{false};
 static_assert(std::atomic<bool>::is_always_lock_free);  // or a handler may not touch it
-static_assert(std::atomic<std::int64_t>::is_always_lock_free);
 
 struct Caught {
   int signal;
   struct sigaction before = {};
-  std::atomic<std::int64_t> first_ms{-1};
+  std::atomic<bool> came{false};
 };
 Caught signals[] = {{SIGINT}, {SIGTERM}, {SIGHUP}};
 bool are_caught = false;
 
-/// std::chrono's clocks are not promised to a handler.
-std::int64_t now_ms() {
-  timespec now = {};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return std::int64_t{now.tv_sec} * 1000 + now.tv_nsec / 1'000'000;
-}
+/// `timeout` leads the process group: it sends its signal to the program, and once more to the whole group.
+bool is_from_leader_of_group(const siginfo_t& info) { return info.si_code == SI_USER && info.si_pid == getpgrp(); }
 
-void handle(int signal) {
+void handle(int signal, siginfo_t* info, void* /*context*/) {
   for (Caught& caught : signals) {
-    if (caught.signal != signal) continue;
-    std::int64_t first_ms = -1;
-    if (caught.first_ms.compare_exchange_strong(first_ms, now_ms()) || now_ms() - first_ms < kTogetherMs) continue;
+    if (caught.signal != signal || !caught.came.exchange(true) || is_from_leader_of_group(*info)) continue;
     std::signal(signal, SIG_DFL);
     std::raise(signal);
   }
@@ -46,10 +36,10 @@ void handle(int signal) {
 
 void catch_interrupts() {
   struct sigaction action = {};
-  action.sa_handler = &handle;
-  action.sa_flags = SA_RESTART;
+  action.sa_sigaction = &handle;
+  action.sa_flags = SA_RESTART | SA_SIGINFO;
   for (Caught& caught : signals) {
-    caught.first_ms = -1;
+    caught.came = false;
     sigaction(caught.signal, nullptr, &caught.before);
     if (caught.before.sa_handler != SIG_IGN) sigaction(caught.signal, &action, nullptr);
   }

@@ -83,6 +83,14 @@ void bind_disparity(py::module_& module) {
                                  [](auto&& visit) { vision::for_each_metric(visit); });
   module.def("compare_disparity", &compare, py::arg("estimate"), py::arg("truth"),
              "Compares two H x W maps over the pixels that have truth, as KITTI's development kits do.");
+  module.def(
+      "_disparity_map",
+      [](const py::object& map, const char* name) {
+        py::array keep;
+        map_of(map, name, keep);
+        return keep;
+      },
+      py::arg("map"), py::arg("name"));
   module.def("mean_of", &vision::mean_of, py::arg("images"), "The mean of each image's figures (KITTI 2012).");
 }
 

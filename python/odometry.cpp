@@ -79,7 +79,11 @@ class LockedOdometry {
   OdometryResult process(const py::object& left, const py::object& right, const py::object& prior) {
     const ImageArray left_image = image_of(left, "left"), right_image = image_of(right, "right");
     std::optional<Eigen::Isometry3d> guess;
-    if (!prior.is_none()) guess = transform_of(prior, "prior");
+    if (py::isinstance<Motion>(prior)) {
+      guess = prior.cast<Motion>().current_from_previous;
+    } else if (!prior.is_none()) {
+      guess = transform_of(prior, "prior");
+    }
     const py::gil_scoped_release other_threads_run;
     const std::lock_guard one_at_a_time(mutex_);
     return odometry_.process(left_image.view, right_image.view, guess);
@@ -172,7 +176,8 @@ void bind_odometry(py::module_& module) {
            }),
            py::arg("calibration"))
       .def("process", &LockedOdometry::process, py::arg("left"), py::arg("right"), py::arg("prior") = py::none(),
-           "The next frame; images as Pipeline.process takes them. `prior`, a 4x4 matrix current_from_previous, only "
+           "The next frame; images as Pipeline.process takes them. `prior`, a Motion or a 4x4 matrix "
+           "current_from_previous, only "
            "guides the search. The first frame has no motion.")
       .def("reset", &LockedOdometry::reset, "Forgets all frames: the next one is a first frame.");
   module.def(

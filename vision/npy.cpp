@@ -131,7 +131,9 @@ Image parse_npy(std::string_view bytes, const std::filesystem::path& file) {
     return type.size() >= 5 && type.substr(2, 2) == n.name && type[4] == type[0];
   });
   if (numbers == kNumbers.end()) {
-    refuse(file, "its numbers are " + quoted(type.substr(0, 12)) + ", not floats or integers");
+    const std::size_t end = type.size() > 1 ? type.find(type[0], 1) : type.npos;  // of the text in quotes
+    refuse(file, "its numbers are " + quoted(type.substr(1, std::min<std::size_t>(end - 1, 12))) +
+                     ", not floats or integers");
   }
   const bool is_big = type[1] == '>';
   const bool swap = numbers->bytes > 1 && is_big != (std::endian::native == std::endian::big);

@@ -16,10 +16,10 @@ class WeightedMedian {
   WeightedMedian(ocl::Context& context, shared::ImageSize size, PixelType type, shared::DisparityRange range,
                  int pixels = 0);
 
-  /// Votes that are less than a step apart count as equal, and the pixel's own is the first of these. A step is so
-  /// short that 16 bits hold the range: 1/128 px of 128 disparities. A pixel without a disparity takes the median of
-  /// the others, with a variance of 1 px^2, if at least six of the eight have a value and are about as bright.
-  /// `images`: the pixels of both views without padding, the left view first.
+  /// Votes that are less than a step apart count as equal, and the pixel's own is the first of these. 15 bits
+  /// can count the steps over the whole range: 1/128 px of 128 disparities. A pixel without a disparity takes the
+  /// median of the others, with a variance of 1 px^2, if at least six of the eight have a value and are about as
+  /// bright. `images`: the pixels of both views without padding, the left view first.
   void filter(const ocl::Buffer<cl_uchar>& images, const Map& disparity, Map& filtered, Map& variance, Views views);
 
  private:

@@ -4,7 +4,7 @@
 // weighs the more, the nearer the two grey values are, so that no surface spreads over its outline; a pixel that is
 // EGOSGM_VOTE_GREYS brighter or darker has none, nor has one without a disparity or outside of the image. A pixel
 // without a disparity takes the median of the others where EGOSGM_FILL_MIN_COUNT of them vote. Votes are ordered by
-// their places: disparities from the least of the range on, in steps of which 16 bits hold the range.
+// their places: disparities from the least of the range on, in steps that 15 bits can count over the whole range.
 #include "grey_at.h"
 #include "method.h"
 

@@ -128,7 +128,10 @@ class StereoVideo:
         _expect_names(options)
         _expect_kinds(frames=frames, motion=motion, objects=objects, outputs=outputs, odometry=odometry)
         paths = [source] if isinstance(source, (str, os.PathLike)) else source if isinstance(source, (tuple, list)) and len(source) == 2 else []
-        is_path = bool(paths) and all(isinstance(path, (str, os.PathLike)) for path in paths)
+        are_paths = [isinstance(path, (str, os.PathLike)) for path in paths]
+        is_path = bool(paths) and all(are_paths)
+        if isinstance(source, bytes) or any(are_paths) and not is_path:
+            raise _egosgm.InvalidArgument(f"source: is {source!r}: give a path, or two, as text or pathlib.Path")
         if is_path:
             source, calibration = _opened([os.fsdecode(path) for path in paths], frames, calibration)
         if frames and not (is_path and isinstance(source, _egosgm.StereoSequence)):

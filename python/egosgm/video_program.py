@@ -162,6 +162,8 @@ class VideoInput:
         place = _Path(folder, inside) if inside and _Path(folder, inside).is_dir() else _Path(folder)
         estimates = self.frames[0].estimate if len(self.frames) == 1 else self.frames[0].estimate.parent
         files = {pair.name: pair.truth for pair in self._pairs_with(estimates, place)[0]}
+        if field in ("against", "uncertainty") and place.is_dir() and any(file.parent != place for file in files.values()):
+            raise _egosgm.InvalidArgument(f"{folder}: has no maps but the truth of a sequence: give a folder of a method's maps")
         is_of_pairs = field in ("flow", "next_truth")  # which the last frame of a video has none of
         alone = [frame.name for i, frame in enumerate(self.frames) if frame.name not in files and (not is_of_pairs or any(self.follows[i + 1:i + 2]))]
         if alone:

@@ -150,6 +150,7 @@ class EvalOverTime(ProgramTest):
         self.assert_all_refused((
             (f"--estimate {truth}", "no truth"), (f"{truth} {truth} --poses {{street}}/poses.txt", "--sequence"),
             (f"{truth} {truth} --variance {truth} --confidence {truth}", "give one of them"), (f"{truth} {truth} --against {empty}", "holds no"),
+            (f"{truth} {truth} --variance {{street}}", "the truth of a sequence"),
             (f"{truth} {truth} --scale 0", "positive"), (f"{other} --sequence {{street}}", "000077.png", "no frame of this number"),
             (f"{truth} {truth} --against {small}", "000001.png", "20x10", "320x96"), (f"{broken} {truth}", "000003.png"),
             (f"{truth} {truth} --flow {truth}", "000000.png", "optical flow"), (f"{same} {same} --plot-frames {{never}}.gif", "--plot-frames", ".svg"),

@@ -117,6 +117,12 @@ def test_what_is_missing_is_named(run):
     assert not (run / "cloud.ply").exists()
 
 
+def test_a_map_of_another_size_is_named(run):
+    egosgm.write_pfm(run / "variance/000001.pfm", np.ones((3, 5), np.float32))
+    expect_refused("of frame 000001 the disparity is 6x4, the variance 5x3 and .*left1.png 6x4", lambda: cloud.main([str(run)]))
+    assert not (run / "cloud.ply").exists()
+
+
 def test_a_name_of_another_format_is_refused(run):
     expect_refused("cloud.pcd: a cloud is a PLY file", lambda: cloud.main([str(run), "--out", str(run / "cloud.pcd")]))
     assert not (run / "cloud.pcd").exists()
@@ -128,7 +134,7 @@ def test_an_edited_report_is_refused(run, entry):
     report = json.loads((run / "report.json").read_text())
     report["frames"][0] = entry
     (run / "report.json").write_text(json.dumps(report))
-    expect_refused("", lambda: cloud.main([str(run)]))
+    expect_refused("report.json: is no report of a run, or was changed since|left0.png|No such file|no such file|no map of frame", lambda: cloud.main([str(run)]))
     assert not (run / "cloud.ply").exists()
 
 

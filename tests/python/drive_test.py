@@ -175,7 +175,7 @@ SMALL = GREY[:40]
     (dict(calibration=3), "calibration: is a int"), (dict(calibration=(700, 700, 320, 240, 0.1)), "calibration: is a tuple: give an egosgm.Calibration"),
     (dict(calibration=CAMERA, frames="1:2"), "frames='1:2'"), (dict(frames=3), "frames: is a int"), (dict(frames=(0, 1)), "frames: is a tuple"),
     (dict(odometry=dict(min_inliers=9)), "odometry: has options, but"), (dict(odometry=[1]), "odometry: is a list"), (dict(motion=np.eye(4)), "motion: is a ndarray"),
-    (dict(source=None), "source: is a NoneType"), (dict(source=""), "give the path of a folder"), (dict(source="missing"), "missing: no such folder"),
+    (dict(source=None), "source: is a NoneType"), (dict(source=("left", None)), "give a path, or two"), (dict(source=b"left"), "give a path, or two"), (dict(source=""), "give the path of a folder"), (dict(source="missing"), "missing: no such folder"),
     (dict(calib="calib.txt"), 'no option named "calib": choose from calibration'), (dict(lag=2), "lag=2: choose 1.* or 0"), (dict(lag=np.arange(2)), "choose 1"),
     (dict(outputs=3), "outputs: is a int: give names"), (dict(outputs=None), "outputs: is a NoneType"), (dict(objects="no"), "objects: is a str: choose True"),
     (dict(objects=True), "objects=True"), (dict(objects=True, calibration=CAMERA, motion=False), "objects=True")], ids=str)
@@ -256,6 +256,16 @@ def test_reports_are_dataclasses(shared_pipeline, street, frames):
 def fields_of(value):
     """What a value tells, to be compared."""
     return {name: getattr(value, name) for name, member in vars(type(value)).items() if isinstance(member, property)}
+
+
+def test_a_prior_is_a_motion_or_its_matrix(street, frames):
+    def found(prior):
+        odometry = egosgm.StereoOdometry(street.calibration)
+        return [odometry.process(frame.left, frame.right, given) for frame, given in zip(frames, (None, prior))][1].motion.current_from_previous
+
+    there = np.eye(4)
+    there[2, 3] = -0.5
+    np.testing.assert_array_equal(found(egosgm.Motion(there)), found(there))
 
 
 @pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda value: pickle.loads(pickle.dumps(value))])

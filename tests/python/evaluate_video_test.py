@@ -382,11 +382,12 @@ def test_maps_may_be_read_when_they_are_needed():
 
 
 @pytest.mark.parametrize("arguments, named", [
+    (dict(estimates=iter(maps(1))), "estimates is a list_iterator: give a list of maps"), (dict(estimates=maps(1), truths=iter(maps(1))), "truths is a list_iterator"),
     (dict(estimates=[]), "no frames"), (dict(estimates=maps(1), truths=[np.zeros((3, 4))]), "4x3"),
     (dict(estimates=maps(1, 1), flows=[np.zeros((HEIGHT, WIDTH)), None]), "H x W x 2"),
     (dict(estimates=maps(1, 1), world_from_camera=poses(0, 1)), "no calibration"),
     (dict(estimates=maps(1, 1), world_from_camera=poses(0), calibration=CAMERA), "1 poses of 2 frames"),
-    (dict(estimates=[np.zeros(3)]), "estimates"), (dict(estimates=[CAMERA]), "estimates: a Calibration in place of a map"), (dict(estimates=maps(1, 1), truths=maps(1)), "truths has 1 of 2 frames"),
+    (dict(estimates=[np.zeros(3)]), "estimates"), (dict(estimates=[CAMERA]), "estimates is no array"), (dict(estimates=maps(1, 1), truths=maps(1)), "truths has 1 of 2 frames"),
     (dict(estimates=maps(1, 1), truths=maps(1, 1, 1)), "truths has 3 of 2 frames"), (dict(estimates=maps(1), reasons=[]), "reasons has 0 of 1"),
     (dict(estimates=maps(1, 1), world_from_camera=np.zeros((2, 4, 4)), calibration=CAMERA), "world_from_camera: matrix 0 is no rotation")])
 def test_wrong_input_is_refused(arguments, named):

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import _egosgm
-from .video_counts import BAD_PX, disparity_of, flow_of, is_sky, is_valid, map_of, size_text
+from .video_counts import BAD_PX, disparity_of, expect_indexable, flow_of, is_sky, is_valid, map_of, size_text
 from .video_evaluation import percent
 
 MEASURES = ("d1", "d2", "fl", "sf")
@@ -114,11 +114,15 @@ def evaluate_scene_flow(estimates: Sequence[Sequence[ArrayLike]], truths: Sequen
     labels, true_labels: for each frame the id of what moves by itself at each pixel, H x W, 0 elsewhere. With true ones, pixels that move and others count
     apart; with both, objects count as found, lost or false.
     """
+    expect_indexable(estimates, "estimates")
     number = len(estimates)
     if not number:
         raise _egosgm.InvalidArgument("evaluate_scene_flow: no frames: give at least one")
     for name, items in (("truths", truths), ("labels", labels), ("true_labels", true_labels)):
-        if items is not None and len(items) != number:
+        if items is None:
+            continue
+        expect_indexable(items, name)
+        if len(items) != number:
             raise _egosgm.InvalidArgument(f"{name} has {len(items)} of {number} frames: give one for each estimate")
     counts, objects = [], np.zeros(3, int)
     for i in range(number):

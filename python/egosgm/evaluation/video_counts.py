@@ -398,6 +398,11 @@ def size_text(array: np.ndarray) -> str:
     return f"{array.shape[1]}x{array.shape[0]}"
 
 
+def expect_indexable(items: Any, name: str) -> None:
+    if not hasattr(items, "__len__") or not hasattr(items, "__getitem__"):
+        raise _egosgm.InvalidArgument(f"{name} is a {type(items).__name__}: give a list of maps, or anything with a length and []")
+
+
 def map_of(item: Any, name: str) -> np.ndarray:
     if np.ma.is_masked(item):
         raise _egosgm.InvalidArgument(f"{name}: has a mask, which nobody looks at: give its filled(egosgm.INVALID_DISPARITY)")
@@ -408,13 +413,7 @@ def map_of(item: Any, name: str) -> np.ndarray:
 
 
 def disparity_of(item: Any, name: str) -> np.ndarray:
-    array = np.asanyarray(item)
-    if array.shape == () and array.dtype == object:
-        raise _egosgm.InvalidArgument(f"{name}: a {type(item).__name__} in place of a map: give H x W arrays, such as the disparity of a frame")
-    if array.dtype == np.int16:
-        raise _egosgm.InvalidArgument(f"{name}: an array of int16, which matchers of OpenCV's form give with 16 steps a pixel: give it divided by 16, as float32, "
-                                      "with egosgm.INVALID_DISPARITY where there is no disparity")
-    return map_of(array, name)
+    return map_of(_egosgm._disparity_map(item, name), name)
 
 
 def flow_of(item: Any, name: str) -> np.ndarray:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from .. import _egosgm
 from .pose_evaluation import inverse, poses_of
-from .video_counts import DENSITIES, SHARES, Counts, Frame, VideoCounts, count_frames, disparity_of, flow_of, map_of, size_text
+from .video_counts import DENSITIES, SHARES, Counts, Frame, VideoCounts, count_frames, disparity_of, expect_indexable, flow_of, map_of, size_text
 
 _Maps = Optional[Sequence[Optional[ArrayLike]]]
 
@@ -203,6 +203,7 @@ def evaluate_video(estimates: Sequence[ArrayLike], truths: _Maps = None, *, cali
     calibration, world_from_camera: the camera and its (N, 4, 4) poses; without them nothing that needs a motion is measured.
     near_px: the region "near" begins at this true disparity.
     """
+    expect_indexable(estimates, "estimates")
     number = len(estimates)
     if not number:
         raise _egosgm.InvalidArgument("evaluate_video: no frames: give at least one")
@@ -215,7 +216,10 @@ def evaluate_video(estimates: Sequence[ArrayLike], truths: _Maps = None, *, cali
                "moving": (moving, "moving", _mask_of), "image": (images, "images", _grey_of), "reason": (reasons, "reasons", _grey_of),
                "flow_to_next": (flows, "flows", flow_of)}
     for items, name, _ in sources.values():
-        if items is not None and len(items) != number:
+        if items is None:
+            continue
+        expect_indexable(items, name)
+        if len(items) != number:
             raise _egosgm.InvalidArgument(f"{name} has {len(items)} of {number} frames: give one for each estimate, None where there is none")
 
     def frame(i: int) -> Frame:

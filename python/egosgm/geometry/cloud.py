@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from .. import _egosgm
 from ..arguments import counted, decimal, left_of_run, Parser, read_json, tell
+from ..evaluation.video_counts import size_text
 from .points import cloud_of_maps, write_new_ply
 
 
@@ -49,8 +50,8 @@ def _frames_of(folder: pathlib.Path) -> Tuple[_egosgm.Calibration, List[Tuple[st
         names = [str(entry.get("name") or f"{entry['frame']:06d}") for entry in report["frames"]]
         frames = [(name, left_of_run(folder, name, os.fsdecode(entry["left"]))) for name, entry in zip(names, report["frames"])]
         lost = sum(entry["odometry"]["motion"] is None for entry in report["frames"][1:] if "odometry" in entry)
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
-        raise _egosgm.InvalidArgument(f"{file}: is no report of a run: {error}") from None
+    except (AttributeError, KeyError, TypeError, ValueError):
+        raise _egosgm.InvalidArgument(f"{file}: is no report of a run, or was changed since: run it again, into a new folder") from None
     world_from_camera = _egosgm.read_poses(poses)
     if len(world_from_camera) != len(frames) or not frames:
         raise _egosgm.InvalidArgument(f"{poses}: has {len(world_from_camera)} poses and {file.name} {len(frames)} frames: let the run end, "
@@ -133,7 +134,12 @@ def main(arguments: Sequence[str]) -> int:
         disparity, variance = (_map_of(folder, name, kind) for kind in ("disparity", "variance"))
         if not pathlib.Path(left).exists():
             raise _egosgm.InvalidArgument(f"{left}: no such file: the colours come from the left images of the run")
-        points, colors, left_out = cloud_of_maps(disparity, variance, _egosgm._read_stored_image(pathlib.Path(left)), calibration, given.cloud_sigma / 100, None, None,
+        image = _egosgm._read_stored_image(pathlib.Path(left))
+        sizes = [size_text(each) for each in (disparity, variance, image)]
+        if len(set(sizes)) > 1:
+            raise _egosgm.InvalidArgument(f"{folder}: of frame {name} the disparity is {sizes[0]}, the variance {sizes[1]} and {left} {sizes[2]}: "
+                                          "one of them was changed after the run")
+        points, colors, left_out = cloud_of_maps(disparity, variance, image, calibration, given.cloud_sigma / 100, None, None,
                                                  given.max_depth, 1)
         normals = normals_of(disparity, calibration, points) if given.normals else np.zeros_like(points)
         grid.add(points @ pose[:3, :3].T + pose[:3, 3], colors, normals @ pose[:3, :3].T)
