@@ -66,12 +66,14 @@ class Disk(LongRuns):
 
     def test_a_signal_that_the_leader_of_the_group_sends_twice_is_one_interrupt(self):
         """As `timeout` does; here a shell. That it sleeps lets the two signals be two to the kernel: where they are one, there is less to see."""
+        twice = '"$@" & read line; kill -TERM $!; sleep 0.1; kill -TERM $!; sleep 0.1; echo sent >&2; wait $!'
         street, out = self.long_street(), self.new_folder()
-        twice = '"$@" & read line; kill -TERM $!; sleep 0.05; kill -TERM $!; wait $!'
-        with subprocess.Popen(["sh", "-c", twice, "sh", PROGRAM, "run", "--odometry", street, "--out", out], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                              stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
-            self.assertIn(" ms", process.stdout.readline())
-            _, errors = process.communicate("\n", timeout=900)
+        process = self.start(street, out, command=("sh", "-c", twice, "sh", PROGRAM), stdin=subprocess.PIPE, start_new_session=True)
+        process.stdin.write("\n")
+        process.stdin.flush()
+        while "sent" not in (line := process.stderr.readline()):  # the program waits to be read
+            self.assertTrue(line)
+        _, errors = process.communicate(timeout=900)
         self.assertEqual(process.returncode, 130, errors)
         self.assertTrue(self.report(out)["frames"])
 
