@@ -4,6 +4,7 @@
 #include "egosgm/calibration.h"
 #include "egosgm/options.h"
 #include "egosgm/vision/image.h"
+#include "egosgm/vision/moving_objects.h"
 #include "vision/stereo_video.h"
 
 namespace egosgm::app {
@@ -11,6 +12,7 @@ namespace egosgm::app {
 /// The maps of a frame as they come from the device: kF32, and kU8 of reasons. Empty where the run does not make it.
 struct ShownMaps {
   vision::Image disparity, variance, reason;
+  const vision::LabelledObjects* objects;  // null where the run does not write them
 };
 
 /// A sink takes a run's maps beside its folder, or in place of it.

@@ -172,7 +172,7 @@ void RunOutputs::make_maps(const Wanted& wanted) {
 
 void RunOutputs::write_scene_flow(const vision::StereoFrame& frame, const vision::Image& left,
                                   const std::optional<Motion>& motion) {
-  tracker_->process(left, map(Output::kDisparity), map(Output::kDynamic), motion);
+  found_ = tracker_->process(left, map(Output::kDisparity), map(Output::kDynamic), motion);
   const std::string from = std::exchange(last_frame_, frame.name);
   const std::optional<vision::SceneFlow> flow = tracker_->scene_flow();
   if (!flow) return;

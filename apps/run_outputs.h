@@ -53,7 +53,9 @@ class RunOutputs {
 
   /// Makes these, too, whatever is written.
   void make_maps(const Wanted& wanted);
-  ShownMaps shown() const { return {map(Output::kDisparity), map(Output::kVariance), map(Output::kReason)}; }
+  ShownMaps shown() const {
+    return {map(Output::kDisparity), map(Output::kVariance), map(Output::kReason), found_ ? &*found_ : nullptr};
+  }
 
   /// Writes the frame that the views hold, and the scene flow from the one before; `left` is its left image, `motion`
   /// the camera's from the frame before.
@@ -78,6 +80,7 @@ class RunOutputs {
   FrameOutputs outputs_;                          // views of them
   vision::FramePanels panels_;
   std::optional<vision::ObjectTracker> tracker_;  // where scene flow is written
+  std::optional<vision::LabelledObjects> found_;  // in the newest frame
   std::string last_frame_, objects_;
 };
 

@@ -160,6 +160,7 @@ class Outputs : public app::FrameSink {
       frame["starts_anew"] = pair.starts_anew;
       frame["frame_id"] = pair.camera;
       if (pair.stamp_ns) frame["stamp_ns"] = *pair.stamp_ns;
+      if (maps.objects) frame["objects"] = *maps.objects;
       Frame result{.maps = {}, .report = made.report};
       for (const auto& [name, map] :
            {std::pair{"disparity", &maps.disparity}, {"variance", &maps.variance}, {"reason", &maps.reason}}) {

@@ -181,7 +181,7 @@ Contents one_camera(const fs::path& folder) {
          (folder / "RIGHT_*").string() +
          "' --calib FILE, with the names that they have; where each shows both views side by side, `egosgm rectify "
          "--side-by-side '" +
-         (folder / "*").string() + "'` parts them";
+         (folder / "*").string() + "'` parts them; --top-bottom, where one view lies above the other";
 }
 
 Contents two_cameras(const fs::path& folder) {

@@ -10,8 +10,8 @@ import PIL.Image
 import PIL.ImageDraw
 
 from . import _egosgm
+from .viewer import ARROW_FRAMES
 
-_ARROW_FRAMES = 10  # an arrow leads to where the object is after so many frames, if it moves on so
 _NEAREST_M = 0.1
 
 
@@ -63,7 +63,7 @@ class ObjectPictures:
         color = _color_of(int(row["id"]))
         centre, velocity = np.array([row["x_m"], row["y_m"], row["z_m"]]), np.array([row["vx_m"], row["vy_m"], row["vz_m"]])
         draw.rectangle([row["left"], row["top"], row["right"], row["bottom"]], outline=color)
-        start, end = self._place(centre), self._place(centre + _ARROW_FRAMES * velocity)
+        start, end = self._place(centre), self._place(centre + ARROW_FRAMES * velocity)
         draw.line([start, end], fill=color, width=2)
         draw.ellipse([end[0] - 3, end[1] - 3, end[0] + 3, end[1] + 3], fill=color)
         draw.text((row["left"], max(0, row["top"] - 12)), f"{int(row['id'])}: {np.linalg.norm(velocity):.2f} m", fill=color)

@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Frames to Rerun, to look at: images, depth, variance, reasons and where the camera was. Needs rerun-sdk."""
+"""Frames to Rerun, to look at: images, depth, variance, reasons, what moves by itself and where the camera was. Needs rerun-sdk."""
 import os
 import pathlib
-from typing import Any, Optional
+from typing import Any, Optional, Sequence
 
 import numpy as np
 
 from . import _egosgm
 from .bag.ros_images import depth_maps
+
+
+ARROW_FRAMES = 10  # an arrow leads to where the object is after so many frames, if it moves on so
 
 
 class RerunOutput:
@@ -61,8 +64,19 @@ class RerunOutput:
         self._log("maps/variance", rerun.DepthImage(np.nan_to_num(variance)))
         if maps.reason is not None:
             self._log("camera/image/reason", rerun.SegmentationImage(maps.reason))
+        if getattr(frame, "objects", None) is not None:
+            self._log_objects(frame.objects.moving)
         self._log("figures/density", rerun.Scalars(maps.report.density))
         self._log("figures/search_fraction", rerun.Scalars(min(1.0, maps.report.search_fraction)))
+
+    def _log_objects(self, moving: Sequence[_egosgm.MovingObject]) -> None:
+        """A frame without one takes the boxes of the frame before away."""
+        ids = [one.id for one in moving]
+        labels = [f"{one.id}: {np.linalg.norm(one.velocity_m):.2f} m a frame" for one in moving]
+        self._log("camera/image/objects", self._rerun.Boxes2D(array=np.reshape([one.box for one in moving], (-1, 4)), array_format=self._rerun.Box2DFormat.XYXY,
+                                                              labels=labels, class_ids=ids))
+        self._log("camera/objects", self._rerun.Arrows3D(origins=np.reshape([one.centre_m for one in moving], (-1, 3)), class_ids=ids,
+                                                         vectors=ARROW_FRAMES * np.reshape([one.velocity_m for one in moving], (-1, 3))))
 
     def finish(self) -> None:
         self._recording.flush()

@@ -163,7 +163,7 @@ def test_what_ends_a_run_leaves_nothing_and_is_in_nobodys_way(tmp_path, street, 
 
 def test_a_viewer_gets_what_a_file_gets(tmp_path, street, frames, monkeypatch, capfd):
     bag = record("mcap", tmp_path / "drive", street, frames)
-    outputs, fails_at = [], []
+    outputs, fails_at, moving = [], [], []
 
     class Viewer:
         def __init__(self, *file):
@@ -175,6 +175,7 @@ def test_a_viewer_gets_what_a_file_gets(tmp_path, street, frames, monkeypatch, c
                 raise egosgm.IoError("the disk is full")
             assert frame.stamp_ns == START + frame.number * RATE_NS and (frame.left == frames[frame.number].left).all()
             assert maps.reason is not None and calibration.fx == pytest.approx(street.calibration.fx)
+            moving.extend([frame.objects.moving] if hasattr(frame, "objects") else [])
             self.calls.append((frame.number, motion is not None))
 
         def finish(self):
@@ -187,6 +188,9 @@ def test_a_viewer_gets_what_a_file_gets(tmp_path, street, frames, monkeypatch, c
     given = ["--bag", str(bag), *TOPICS, *SET, "--out", str(tmp_path / "out.rrd"), "--rerun"]
     assert bag_program.main(given) == 0
     assert [output.calls for output in outputs] == [[file, *((i, i > 0) for i in range(FRAMES)), "finish"] for file in ((tmp_path / "out.rrd",), ())]
+    assert not moving
+    written = ["--bag", str(bag), *TOPICS, *SET, "--out", str(tmp_path / "objects"), "--write", "objects", "--rerun"]
+    assert bag_program.main(written) == 0 and moving == [[]] * FRAMES
     outputs.clear()
     fails_at.append(1)
     assert bag_program.main(given) == 1 and "the disk is full" in capfd.readouterr().err

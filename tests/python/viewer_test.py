@@ -46,6 +46,21 @@ def test_a_recording_holds_what_came(street, frames, tmp_path):
     assert not (tmp_path / "given_up.rrd").exists()
 
 
+def test_what_moves_is_boxed_and_led_by_arrows(tmp_path):
+    traffic = egosgm.SyntheticSequence(width=480, height=180, frames=3, seed=3, moving_object=True, supersampling=1)
+    file = tmp_path / "traffic.rrd"
+    output, moving = RerunOutput(file), []
+    for frame in egosgm.run([(pair.left, pair.right) for pair in map(traffic.render, range(3))], traffic.calibration, objects=True, disparities=64, paths=4):
+        output.add(frame, frame.maps, frame.motion, frame.calibration)
+        moving.append(frame.objects.moving)
+    output.finish()
+    assert not moving[0] and moving[2]
+    printed = subprocess.run([sys.executable, "-m", "rerun", "rrd", "print", "-vvv", file], capture_output=True, text=True, check=True).stdout
+    for name in ("/camera/image/objects", "/camera/objects"):
+        assert sum(int(line.split(" with ")[1].split(" ")[0]) for line in printed.splitlines() if line.startswith("Chunk(") and f" - {name} - " in line) == 3
+    assert f"{moving[2][0].id}: {np.linalg.norm(moving[2][0].velocity_m):.2f} m a frame" in printed
+
+
 def test_without_the_package_it_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "rerun", None)
     expect_refused("pip install rerun-sdk", RerunOutput)
