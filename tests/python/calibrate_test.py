@@ -155,6 +155,10 @@ def test_a_charuco_board(tmp_path, capsys):
     code, said = calibrate(folder, tmp_path / "calib.yml", capsys, "--marker", "0.02", board="8x6")
     assert code == 0, said
     expect_the_cameras(tmp_path / "calib.yml", within_px=8)
+    for board in ("7x5", "6x8"):  # its inner corners, and rows first
+        code, said = calibrate(folder, tmp_path / "wrong.yml", capsys, "--marker", "0.02", board=board)
+        assert code == 2 and f"px, with which nothing can be rectified: is it a ChArUco board of {board} squares" in said, said
+        assert not (tmp_path / "wrong.yml").exists()
 
 
 @pytest.mark.parametrize("board, named", [("8x6", "one of 7x5 is there"), ("6x5", "one of 7x5 is there"), ("8x5", "one of 7x5 is there"), ("7", "--board 7:"), ("2x9", "--board 2x9")])

@@ -23,6 +23,7 @@ _LEAST_BAD_PX = 0.3  # no view with a smaller error is bad
 _MOST_LEFT_OUT = 0.3  # of the views; where more are bad, something else is wrong
 _CELLS = (8, 6)  # of the image, for its coverage
 _LEAST_COVERAGE, _LEAST_TILT_DEG, _MOST_ERROR_PX = 0.5, 15.0, 1.0
+_USELESS_ERROR = 0.01  # of the width
 _MOST_SQUARE_M, _LEAST_SQUARE_M = 0.5, 0.001
 _DICTIONARY = "DICT_4X4_50"
 _LEAST_BASELINE_M = 1e-4  # of pictures of one camera next to nothing is found
@@ -228,6 +229,17 @@ def _coverage(views: Sequence[_View], side: int, size: Tuple[int, int]) -> float
     return len({tuple(cell) for cell in cells.tolist()}) / (_CELLS[0] * _CELLS[1])
 
 
+def _error_px(stereo: _Stereo) -> float:
+    return max(stereo.error_px, *(camera.error_px for camera in stereo.cameras))
+
+
+def _check_error(stereo: _Stereo, board: Board, width: int) -> None:
+    error_px = _error_px(stereo)
+    if not error_px <= _USELESS_ERROR * width:
+        raise _egosgm.InvalidArgument(f"the error is {error_px:.3g} px, with which nothing can be rectified: is it {board.name}, columns first, and are both images of the same "
+                                      "moment?")
+
+
 def _check_stance(stereo: _Stereo) -> None:
     x, y, z = stereo.translation_m
     if not np.linalg.norm(stereo.translation_m) >= _LEAST_BASELINE_M:
@@ -247,7 +259,7 @@ def _advice(stereo: _Stereo, coverage: Sequence[float], views: int) -> List[str]
         found.append(f"the board was never tilted by more than {max(stereo.cameras[0].tilts_deg):.0f} degrees, so that focal lengths are uncertain: tilt it to all sides")
     if views < _MANY_VIEWS:
         found.append(f"{counted(views, 'view')} are few: take 20")
-    if max(stereo.error_px, *(camera.error_px for camera in stereo.cameras)) > _MOST_ERROR_PX:
+    if _error_px(stereo) > _MOST_ERROR_PX:
         found.append("errors are large: is the board flat, are both images of the same moment, are --board and --square right?")
     return found
 
@@ -303,6 +315,7 @@ def main(arguments: Sequence[str]) -> int:
     except cv2.error as error:
         reason = str(error).strip().splitlines()[-1]
         raise _egosgm.InvalidArgument(f"the views do not tell the cameras ({reason}): give pictures of the board tilted to all sides") from None
+    _check_error(stereo, board, found.size[0])
     _check_stance(stereo)
     coverage = [_coverage(views, side, found.size) for side in (0, 1)]
     _egosgm._write_new_file(out, _text(stereo, found.size).encode())  # first: the standard output may be full
