@@ -243,7 +243,7 @@ fs::path OutputFolder::named_file(const std::string& option, const std::string& 
 void OutputFolder::begin(Json identity) {
   is_made_ = !is_there(path_);
   vision::make_folder(path_);
-  if (earlier_.is_null()) return;
+  if (!goes_on()) return;
   // One that lost its device went on elsewhere, with the same bits.
   const Json fallback = earlier_.value("fallback", Json());
   if (fallback.is_object() && identity.contains("device") &&
@@ -253,8 +253,13 @@ void OutputFolder::begin(Json identity) {
   expect_same(shown_, earlier_, identity);
 }
 
+void OutputFolder::expect_no_other_run() const {
+  if (is_there(path_ / "report.json"))
+    throw IoError(fmt::format("--out {}: another run has begun there meanwhile: choose another folder", shown_));
+}
+
 void OutputFolder::leave_nothing() const {
-  if (!earlier_.is_null()) return;
+  if (goes_on()) return;
   std::error_code none;  // a folder with a file stays
   for (const char* file : {"report.json", kRunCalibration}) fs::remove(path_ / file, none);
   for (const std::string& folder : folders_of(planned_)) fs::remove(path_ / folder, none);
@@ -272,7 +277,7 @@ bool OutputFolder::is_to_write(const fs::path& file, std::string_view bytes) con
   if (!(planned_.contains(name) || kGrowing.contains(name)) || !is_there(file)) return true;
   const std::string earlier = is_regular(file) ? vision::read_file(file, kAnySize) : std::string();
   if (earlier == bytes) return false;
-  if (earlier_.is_null() || !is_regular(file)) {
+  if (!goes_on() || !is_regular(file)) {
     throw IoError(file.string() + ": has come there while the run wrote, and stays: choose another --out");
   }
   // A run that stopped wrote them up to there.

@@ -41,6 +41,12 @@ class OutputFolder {
   /// Whether the run that is to go on had finished, and wrote all that this one would, but what it could not read.
   bool lacks_nothing() const { return lacks_nothing_; }
 
+  /// Whether a run lay there when this looked, which is to go on.
+  bool goes_on() const { return !earlier_.is_null(); }
+
+  /// Throws IoError where a report lies there, which of a new run is another one's.
+  void expect_no_other_run() const;
+
   /// The file that `option` names, which may lie in OUT. An empty name is none. Throws InvalidArgument as
   /// expect_new_file does, and where the run writes that one anyway.
   std::filesystem::path named_file(const std::string& option, const std::string& file);

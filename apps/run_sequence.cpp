@@ -96,7 +96,7 @@ class Run {
   bool operator()() {
     const vision::BeforeWrite recording(
         [this](const auto& file, auto bytes) { return folder_.is_to_write(file, bytes); });
-    write_report(false, kKilled);
+    take_folder();
     try {
       save_config();
       pipeline_.prepare(source_.type(), outputs_->views());
@@ -127,6 +127,16 @@ class Run {
   }
 
   bool has_folder() const { return !folder_.path().empty(); }
+
+  /// By the first report: of two runs that began together in one new folder, one finds the other's, and leaves it.
+  void take_folder() {
+    std::optional<vision::KeepFiles> others;
+    if (has_folder() && !folder_.goes_on()) {
+      folder_.expect_no_other_run();
+      others.emplace();
+    }
+    write_report(false, kKilled);
+  }
 
   static std::string motion_of(const SequenceJob& job) {
     if (!job.source->sequence().has_calibration) return "none: the images have no calibration";

@@ -152,6 +152,18 @@ class Disk(LongRuns):
             self.assert_refused(["run", "--odometry", street, "--out", out, "--resume"], name, code=2)
             self.assertEqual((out / name).read_text(), "mine")
 
+    def test_of_two_runs_that_begin_together_in_one_folder_the_second_leaves_the_first(self):
+        pipe, out = self.new_folder() / "pipe", self.new_folder() / "out"
+        os.mkfifo(pipe)
+        process = subprocess.Popen([PROGRAM, "run", self.street, "--poses", pipe, "--out", out], stderr=subprocess.PIPE, text=True)
+        with open(pipe, "w") as writer:  # once the second has looked at the folder, and waits for its poses
+            self.assert_works("run", "--odometry", self.street, "--out", out)
+            files = {file: file.read_bytes() for file in out.rglob("*") if file.is_file()}
+            writer.write((self.street / "poses.txt").read_text())
+        _, errors = process.communicate(timeout=900)
+        self.assertEqual((process.returncode, without_waiting(errors)), (1, f"egosgm: error: --out {out}: another run has begun there meanwhile: choose another folder\n"))
+        self.assertEqual({file: file.read_bytes() for file in out.rglob("*") if file.is_file()}, files)
+
     def test_a_file_that_vanishes_changes_size_or_is_cut(self):
         last = f"image_0/{self.LONG - 1:06d}.png"
         for words, breaks in (("cannot be read", pathlib.Path.unlink), ("", lambda file: file.write_bytes(grey_png(WIDTH, HEIGHT + 1))), ("truncated", lambda file: os.truncate(file, 1000))):
