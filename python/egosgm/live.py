@@ -4,6 +4,7 @@ import atexit
 import collections
 import contextlib
 import http.server
+import os
 import pathlib
 import shlex
 import sys
@@ -48,8 +49,15 @@ class LivePairs:
     """
 
     def __init__(self, left: Union[int, str, None] = None, right: Union[int, str, None] = None, *, side_by_side: Union[int, str, None] = None,
-                 top_bottom: Union[int, str, None] = None, calib: Union[str, Sequence[str]], unit_m: Optional[float] = None, fisheye: bool = False) -> None:
-        given = [None if source is None else str(source) for source in (left, right, side_by_side, top_bottom)]
+                 top_bottom: Union[int, str, None] = None, calib: Union[str, "os.PathLike[str]", Sequence[str]], unit_m: Optional[float] = None, fisheye: bool = False) -> None:
+        sources = dict(left=left, right=right, side_by_side=side_by_side, top_bottom=top_bottom)
+        for name, source in sources.items():
+            if not isinstance(source, (int, str, os.PathLike, type(None))) or isinstance(source, int) and source < 0:
+                what = source if isinstance(source, int) else f"a {type(source).__name__}"
+                raise _egosgm.InvalidArgument(f"{name} is {what}: give a camera's number, from 0 on, a device or the name of a video")
+        if not isinstance(calib, (str, os.PathLike, list, tuple)):
+            raise _egosgm.InvalidArgument(f"calib is a {type(calib).__name__}: give the name of a calibration's file, or one for each camera")
+        given = [None if source is None else str(source) for source in sources.values()]
         if [source is not None for source in given] not in ([True, True, False, False], [False, False, True, False], [False, False, False, True]):
             raise _egosgm.InvalidArgument("give one input: --left and --right, or --side-by-side, or --top-bottom; each is a camera, such as 0 or /dev/video0, or a video")
         self._source = open_pairs(*given, None, None, False)
@@ -58,7 +66,7 @@ class LivePairs:
         first = next(self._stream, None)
         if first is None:
             raise _egosgm.InvalidArgument(f"the input has no pair{': ' * bool(self._source.note)}{self._source.note}")
-        self.rectifier = Rectifier([calib] if isinstance(calib, str) else calib, first.left.shape[1::-1], unit_m, fisheye)
+        self.rectifier = Rectifier(list(calib) if isinstance(calib, (list, tuple)) else [os.fspath(calib)], first.left.shape[1::-1], unit_m, fisheye)
         self.rectifier(RawPair(first.left, first.right))  # a pair of its own: the first one is rectified when it is asked for
         self.calibration, self.dropped = self.rectifier.calibration, 0
         self._newest: Optional[RawPair] = first

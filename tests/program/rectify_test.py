@@ -12,7 +12,7 @@ import cv2
 import numpy
 
 from input_case import InputTest, read_grey, rotation, sampled, write_grey
-from program_case import FRAMES, HEIGHT, WIDTH, png
+from program_case import FRAMES, HEIGHT, WIDTH, grey_png, png
 
 
 def write_avi(file, images, is_bottom_up=False):
@@ -278,6 +278,13 @@ class Rectify(RectifyTest):
         self.assert_refused(["rectify", *self.patterns(street), "--out", out], "000003.png")
         self.assert_works("odometry", out, "--quiet", "--out", self.new_folder() / "poses.txt")
         self.assertEqual(len(list((out / "image_1").iterdir())), 3)
+
+    def test_a_pair_of_another_size_is_named(self):
+        street, calib = self.broken_street(), self.new_folder() / "stereo.yml"
+        calib.write_text(self.opencv_yaml(given=False))
+        for side in (0, 1):
+            (street / f"image_{side}/000002.png").write_bytes(grey_png(WIDTH, HEIGHT + 1))
+        self.assert_refused(["rectify", *self.patterns(street, calib), "--out", self.new_folder() / "out"], f"pair 3 is {WIDTH}x{HEIGHT + 1}, the first one {WIDTH}x{HEIGHT}")
 
     def test_euroc_folders(self):
         out = self.new_folder() / "out"

@@ -242,6 +242,10 @@ def test_doctor_looks_at_bags(tmp_path, street, frames, capfd):
     findings = examined(capfd, between, "--max-skew-ms", 50)
     assert findings["times"]["verdict"] == "problem" and "other moments" in findings["times"]["text"]
     assert list(findings) == ["images", "calibration", "times"]
+    for times, verdict in (([0, 0, 1], "note"), ([0, 0, 0], "problem")):  # where most pairs have the stamp of another one, hardly any are left
+        bag = record("mcap", tmp_path / verdict, street, frames, times=[START + time * RATE_NS for time in times])
+        findings = examined(capfd, bag)
+        assert findings["times"]["verdict"] == verdict and "the stamp of the one before" in findings["times"]["text"]
 
 
 def test_rows_of_poses_are_of_no_bag_that_lost_images(tmp_path, street, frames, capfd):

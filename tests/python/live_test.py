@@ -96,6 +96,12 @@ def test_pairs_that_nobody_asked_for_are_dropped_and_the_newest_is_given(frames,
     expect_refused("gives its pairs once", lambda: list(pairs))
 
 
+def test_sources_and_calibrations_of_other_types_are_named(street, calib):
+    expect_refused("right is -1: give a camera's number", lambda: live.LivePairs(0, -1, calib=calib))
+    expect_refused("left is a ndarray: give a camera's number", lambda: live.LivePairs(np.zeros((2, 2)), 1, calib=calib))
+    expect_refused("calib is a Calibration: give the name of a calibration's file", lambda: live.LivePairs(0, 1, calib=street.calibration))
+
+
 def test_a_result_comes_before_the_next_pair_is_asked_for(street, cameras, calib):
     goes_on = threading.Event()
     cameras.ends = lambda: goes_on.wait(60)  # a camera that gives nothing more for now

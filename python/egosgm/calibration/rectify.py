@@ -56,7 +56,7 @@ class Rectifier:
 
     def __init__(self, calib: Optional[Sequence[str]], size: Optional[Tuple[int, int]], unit_m: Optional[float] = None, fisheye: bool = False,
                  alpha: float = 0.0, euroc: Optional[str] = None) -> None:
-        self._alpha, self.rectification = alpha, None
+        self._alpha, self.rectification, self._pairs = alpha, None, 0
         self.rig: Optional[StereoRig] = None
         if euroc:
             if calib or unit_m is not None or fisheye:
@@ -81,6 +81,10 @@ class Rectifier:
             height, width = pair.left.shape[:2]
             self.rectification = Rectification(self.rig, width, height, self._alpha)
             self.calibration = self.rectification.calibration
+        self._pairs += 1
+        if pair.left.shape[:2] != self.rectification.valid.shape:
+            raise _egosgm.InvalidArgument("pair {} is {}x{}, the first one {}x{}: all need one size".format(
+                self._pairs, *pair.left.shape[1::-1], *self.rectification.valid.shape[::-1]))
         pair.left, pair.right = self.rectification.rectify(pair.left, pair.right)
 
 

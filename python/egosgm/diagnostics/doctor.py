@@ -144,7 +144,8 @@ class _OfBag(_OfStream):
     def times(self) -> Finding:
         gaps, text = self._bag.gaps, self._bag.gaps.text()
         if text:
-            is_problem = bool(gaps.broken or gaps.unpaired_left or gaps.unpaired_right or gaps.are_other_moments(gaps.largest_skew_ms))
+            is_problem = bool(gaps.broken or gaps.unpaired_left or gaps.unpaired_right or gaps.are_other_moments(gaps.largest_skew_ms)
+                              or gaps.repeated > len(self._stamps))  # more than are left
             return Finding("problem" if is_problem else "note", "times", text, "record all topics without loss, from cameras that are triggered together")
         places = list(range(len(self._stamps)))
         return _of_times([1e-9 * (stamp - self._stamps[0]) for stamp in self._stamps], "stamps of the images", [f"{place:06d}" for place in places], places)
