@@ -284,7 +284,7 @@ class Rectify(RectifyTest):
         calib.write_text(self.opencv_yaml(given=False))
         for side in (0, 1):
             (street / f"image_{side}/000002.png").write_bytes(grey_png(WIDTH, HEIGHT + 1))
-        self.assert_refused(["rectify", *self.patterns(street, calib), "--out", self.new_folder() / "out"], f"pair 3 is {WIDTH}x{HEIGHT + 1}, the first one {WIDTH}x{HEIGHT}")
+        self.assert_refused(["rectify", *self.patterns(street, calib), "--out", self.new_folder() / "out"], f"pair 3 is {WIDTH}x{HEIGHT + 1}, the pairs before {WIDTH}x{HEIGHT}")
 
     def test_euroc_folders(self):
         out = self.new_folder() / "out"

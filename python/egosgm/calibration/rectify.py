@@ -56,7 +56,7 @@ class Rectifier:
 
     def __init__(self, calib: Optional[Sequence[str]], size: Optional[Tuple[int, int]], unit_m: Optional[float] = None, fisheye: bool = False,
                  alpha: float = 0.0, euroc: Optional[str] = None) -> None:
-        self._alpha, self.rectification, self._pairs = alpha, None, 0
+        self._alpha, self.rectification = alpha, None
         self.rig: Optional[StereoRig] = None
         if euroc:
             if calib or unit_m is not None or fisheye:
@@ -81,10 +81,6 @@ class Rectifier:
             height, width = pair.left.shape[:2]
             self.rectification = Rectification(self.rig, width, height, self._alpha)
             self.calibration = self.rectification.calibration
-        self._pairs += 1
-        if pair.left.shape[:2] != self.rectification.valid.shape:
-            raise _egosgm.InvalidArgument("pair {} is {}x{}, the first one {}x{}: all need one size".format(
-                self._pairs, *pair.left.shape[1::-1], *self.rectification.valid.shape[::-1]))
         pair.left, pair.right = self.rectification.rectify(pair.left, pair.right)
 
 
@@ -95,12 +91,15 @@ class SequenceFolder:
         self._folder, self.frames, self._times = folder, 0, []  # type: ignore[var-annotated]
         self._is_timed = True
 
-    def add(self, pair: RawPair) -> None:
+    def expect_size(self, pair: RawPair) -> None:
         size = pair.left.shape[1::-1]
         if self.frames > 0 and size != self.size:
             raise _egosgm.InvalidArgument("pair {} is {}x{}, the pairs before {}x{}: all need one size".format(self.frames + 1, *size, *self.size))
+
+    def add(self, pair: RawPair) -> None:
+        self.expect_size(pair)
         if self.frames == 0:
-            self.size, self._is_colour = size, pair.left.ndim == 3
+            self.size, self._is_colour = pair.left.shape[1::-1], pair.left.ndim == 3
             self._sides = ("image_2", "image_3") if self._is_colour else ("image_0", "image_1")
             for side in self._sides:
                 (self._folder / side).mkdir(parents=True, exist_ok=True)
@@ -172,6 +171,7 @@ def main(arguments: Sequence[str]) -> int:
         for pair in itertools.chain([first] if first else [], stream):
             if stops:
                 break
+            folder.expect_size(pair)  # raw and rectified pairs have one size
             rectifier(pair)
             folder.add(pair)
             say_line(f"pair {folder.frames}")
