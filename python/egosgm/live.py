@@ -124,6 +124,12 @@ class LivePairs:
         """What of the input could not be used."""
         return str(self._source.note)
 
+    def __enter__(self) -> "LivePairs":
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self.close()
+
     def close(self) -> None:
         """No more pairs are read; the newest one is still handed out."""
         with self._changed:
@@ -277,8 +283,6 @@ def main(arguments: Sequence[str]) -> int:
         at_end.callback(pairs.close)
         at_end.enter_context(warnings.catch_warnings())
         warnings.showwarning = lambda message, *_, **__: say(str(message))
-        if page:
-            tell(f"{page.address} shows it; Ctrl-C ends it")
         is_terminal = sys.stdout is not None and sys.stdout.isatty()
         at_end.callback(lambda: tell("") if is_terminal and shown else None)
         for frame in video:
@@ -292,6 +296,8 @@ def main(arguments: Sequence[str]) -> int:
                 viewer.add(frame, frame.maps, frame.motion, frame.calibration)
             if record:
                 record.add(RawPair(frame.left, frame.right, pairs.taken_s - begin_s))
+            if page and shown == 1:  # not before: the first frame tells whether there is a device, and room for the record
+                tell(f"{page.address} shows it; Ctrl-C ends it")
             tell(f"\r\x1b[K{state}" if is_terminal else state, end="" if is_terminal else "\n")
     if pairs.note:
         say(pairs.note)

@@ -105,13 +105,19 @@ def test_sources_and_calibrations_of_other_types_are_named(street, calib):
 def test_a_result_comes_before_the_next_pair_is_asked_for(street, cameras, calib):
     goes_on = threading.Event()
     cameras.ends = lambda: goes_on.wait(60)  # a camera that gives nothing more for now
-    pairs = live.LivePairs(0, 1, calib=calib)
-    found = iter(egosgm.run(pairs, pairs.calibration, lag=0, **OPTIONS))
-    while next(found).number + pairs.dropped < FRAMES - 1:
-        pass
-    assert not goes_on.is_set()
-    goes_on.set()
+    with live.LivePairs(0, 1, calib=calib) as pairs:
+        found = iter(egosgm.run(pairs, pairs.calibration, lag=0, **OPTIONS))
+        while next(found).number + pairs.dropped < FRAMES - 1:
+            pass
+        assert not goes_on.is_set()
+        goes_on.set()
     assert list(found) == []
+
+
+def test_no_page_is_told_of_where_nothing_can_be_matched(cameras, calib, capsys):
+    assert run_tool(["live", "0", "1", "--calib", calib, "--device", "no such"]) == 2
+    told = capsys.readouterr()
+    assert told.out == "" and "no such" in told.err and told.err.count("\n") == 1
 
 
 def test_an_error_of_the_source_comes_after_the_pairs_before_it(frames, cameras, calib):

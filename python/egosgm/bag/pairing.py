@@ -61,11 +61,11 @@ class Gaps:
             at, longest = max(self.gaps, key=lambda gap: gap[1])
             parts.append(f"{counted(len(self.gaps), 'gap')}, the longest of {longest:.3f} s before frame {at}")
         if self.repeated:
-            parts.append(f"{self.repeated} pairs have the stamp of the one before, and are left out")
+            parts.append(f"{counted(self.repeated, 'pair')} with the stamp of the one before, left out")
         if self.without_pose:
-            parts.append(f"{self.without_pose} frames lie outside of the poses' times, or in a gap of half a second: odometry finds the motion there")
+            parts.append(f"{counted(self.without_pose, 'frame')} outside of the poses' times, or in a gap of half a second: odometry finds the motion there")
         if self.steps_back:
-            parts.append(f"time steps back {self.steps_back} times, where the method starts anew")
+            parts.append(f"time steps back {counted(self.steps_back, 'time')}, where the method starts anew")
         return "; ".join(parts)
 
 
