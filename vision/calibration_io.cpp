@@ -376,7 +376,8 @@ SizedCalibration read_sized_calibration(const std::filesystem::path& file, Kitti
   throw InvalidArgument(
       file.string() +
       ": holds no calibration; give KITTI's (P0: or P_rect_00:), Middlebury's (cam0=) or rows of fx, fy, "
-      "cx, cy, baseline_m");
+      "cx, cy, baseline_m; what others wrote (f, B, a field of view) goes to --calib beside --left and --right, which "
+      "need the Python package for it");
 }
 
 void write_calibration(const std::filesystem::path& file, const Calibration& calibration) {

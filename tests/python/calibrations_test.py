@@ -62,6 +62,7 @@ RECTIFIED = {
     "cam_to_cam.yaml": yaml.safe_dump(dict(intrinsics=dict(cam0=dict(camera_matrix=[1, 2, 3, 4])), disparity_to_depth=dict(cams_12=Q))),
     "few.yaml": f"f: {F}\nB: {B}\ncx: {CX}\ncy: {CY}\n",
     "rendered.json": json.dumps(dict(image_size_x=WIDTH, image_size_y=HEIGHT, fov=math.degrees(2 * math.atan(WIDTH / 2 / F)), baseline=B)),
+    "rendered.txt": f"# a camera of a simulator\nimage_size_x={WIDTH}\nimage_size_y={HEIGHT}\nhfov = {math.degrees(2 * math.atan(WIDTH / 2 / F))}\nB={B}\n",
     "rendered.yaml": yaml.safe_dump(dict(camera=dict(width=WIDTH, height=HEIGHT, vfov_deg=math.degrees(2 * math.atan(HEIGHT / 2 / F))), baseline=B)),
     "K.txt": " ".join(map(str, flat(K))) + f"\n{B}\n",
     "q.yml": opencv_yaml(Q=Q),

@@ -227,7 +227,9 @@ def _of_element(element: Any) -> Any:
 
 
 def data_of(text: str, file: pathlib.Path) -> Any:
-    """What XML, JSON or YAML holds."""
+    """What XML, JSON or YAML holds, or rows of NAME=VALUE."""
+    if all(re.match(r"[\w.]+[ \t]*=[^=]*$", row) for row in (row.strip() for row in text.splitlines()) if row and row[0] != "#"):
+        text = text.replace("=", ": ")
     _check_parts(text, file)
     start = text.lstrip()[:1]
     try:

@@ -91,7 +91,7 @@ def _of_data(data: Any, file: pathlib.Path, is_fisheye: bool, size: Optional[Tup
         return formats.orb_slam(flat, file, size)
     nested = {f"{outer}_{inner}": value for outer, group in flat.items() if isinstance(group, dict) and "data" not in group
               for inner, value in group.items()}
-    return named_values.by_names({**nested, **flat}, file, "YAML, XML or JSON", is_fisheye, size)
+    return named_values.by_names({**nested, **flat}, file, "a file of names and values", is_fisheye, size)
 
 
 def _contents(file: pathlib.Path) -> Any:
