@@ -10,8 +10,10 @@ import pathlib
 import numpy as np
 
 import egosgm
+from egosgm.evaluation.maps import is_valid
+from egosgm.evaluation.moved_maps import move
 from egosgm.evaluation.pose_evaluation import inverse
-from egosgm.evaluation.video_counts import BAD_PX, is_valid, move
+from egosgm.evaluation.regions import BAD_PX
 
 SINGLE_FRAME = {"temporal": False}
 

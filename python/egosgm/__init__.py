@@ -37,7 +37,7 @@ from .evaluation.flow_evaluation import ObjectCounts, OutlierFigures, SceneFlowE
 from .evaluation.pose_evaluation import MotionError, PoseEvaluation, SegmentError, evaluate_poses
 from .calibration.rectification import Rectification, StereoRig
 from .values import as_dataclass as _as_dataclass
-from .evaluation.video_counts import move_map
+from .evaluation.moved_maps import move_map
 from .evaluation.video_evaluation import DensityFigures, RegionFigures, VideoEvaluation, VideoFigures, evaluate_video
 
 __all__ = ["__version__", "read_calibration", "read_euroc_rig", "read_opencv_rig", "depth_sigma_from_disparity", "Rectification", "StereoRig", "StereoVideo", "VideoFrame", "match_pair", "Matcher", "run", "PointCloud", "point_cloud", "write_ply", "ObjectCounts", "OutlierFigures", "SceneFlowEvaluation", "SceneFlowFigures", "evaluate_scene_flow", "MotionError", "PoseEvaluation", "SegmentError", "evaluate_poses", "DensityFigures", "RegionFigures", "VideoEvaluation", "VideoFigures", "evaluate_video", "move_map",

@@ -19,7 +19,7 @@ from .evaluation.flow_evaluation import ObjectCounts as ObjectCounts, OutlierFig
 from .evaluation.pose_evaluation import MotionError as MotionError, PoseEvaluation as PoseEvaluation, SegmentError as SegmentError, evaluate_poses as evaluate_poses
 from .calibration.rectification import Rectification as Rectification, StereoRig as StereoRig
 from .evaluation.video_evaluation import DensityFigures as DensityFigures, RegionFigures as RegionFigures, VideoEvaluation as VideoEvaluation, VideoFigures as VideoFigures, evaluate_video as evaluate_video
-from .evaluation.video_counts import move_map as move_map
+from .evaluation.moved_maps import move_map as move_map
 
 __version__: str
 INVALID_DISPARITY: float

@@ -12,14 +12,10 @@ from numpy.typing import NDArray
 
 from . import _egosgm
 from .bag import Bag
-from .calibration.reader import read_calibration
-from .geometry.depth import depth_sigma_from_disparity
+from .calibration.reader import any_calibration, read_calibration
 from .calibration.rectification import StereoRig
-
-
-def any_calibration(width: int, height: int) -> _egosgm.Calibration:
-    """In place of one that is not known: nothing is predicted then, so that any one does."""
-    return _egosgm.Calibration(width, width, width / 2, height / 2, 1)
+from .geometry.depth import depth_sigma_from_disparity
+from .videos import VideoPairs
 
 
 _KINDS: Dict[str, Tuple[Any, str]] = {
@@ -56,7 +52,6 @@ def _opened(paths: Sequence[str], frames: str, calibration: Any) -> Tuple[Any, A
     if not right and _egosgm._is_bag(path):
         return Bag(path), calibration
     if _egosgm._is_video(path):
-        from .videos import VideoPairs
         is_file = isinstance(calibration, (str, os.PathLike))
         pairs = VideoPairs(path, right, os.fsdecode(calibration) if is_file else "")
         return pairs, pairs.source.calibration if is_file else calibration

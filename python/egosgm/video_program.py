@@ -13,8 +13,9 @@ import numpy as np
 from . import _egosgm
 from .evaluation import plots
 from .arguments import comparison_parser, counted, decimal, json_text, Parser, resolve_comparison, tell, text_argument
+from .evaluation.maps import Frame
 from .evaluation.pose_evaluation import inverse
-from .evaluation.video_counts import Frame, VideoCounts, count_frames
+from .evaluation.video_counts import VideoCounts, count_frames
 from .evaluation.video_evaluation import VideoFigures, density_of, figures_of, regions_of
 
 _Path = pathlib.Path

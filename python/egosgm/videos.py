@@ -6,7 +6,7 @@ import types
 from typing import Any, Iterator, List, Tuple
 
 from . import _egosgm
-from .drive import any_calibration
+from .calibration.reader import any_calibration
 
 _LEAST_OF_TWO_VIEWS = 2.5  # width to height of an image that holds both side by side: less may be one camera's
 

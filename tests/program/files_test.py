@@ -2,9 +2,7 @@
 """What the program may write: it removes nothing, and replaces only report and poses of a run that goes on. Environment as for program_case.py."""
 import json
 import os
-import re
 import shutil
-import signal
 import stat
 import subprocess
 import threading
@@ -240,64 +238,3 @@ class Streams(FilesTest):
             self.skipTest("no device can be made or opened here")
         self.assert_works("odometry", self.street, "--out", device, "--quiet")
         self.assertTrue(stat.S_ISCHR(device.lstat().st_mode))
-
-
-
-class TuneFiles(FilesTest):
-    def test_an_interrupt_keeps_the_earlier_tuning(self):
-        file = self.new_folder() / "tuning.json"
-        self.assert_works("tune", "--file", file, *TUNE, "ForwardWarp")
-        kept = json.loads(file.read_text())
-        next(iter(kept.values())).update(tile_width=96, tile_height=8)
-        file.write_text(json.dumps(kept))
-        before = file.read_bytes()
-        for lines in (1, 4):  # then the last one of six waits to be read
-            process = self.started("tune", "--file", file, *TUNE, "ForwardWarp", lines=lines)
-            process.send_signal(signal.SIGINT)
-            _, errors = process.communicate(timeout=900)
-            # PoCL's compiler says the first line where the interrupt meets it; nothing else may come.
-            said = errors.removeprefix("1 error generated.\n")
-            self.assertEqual((process.returncode, said), (130, f"egosgm: interrupted: nothing is kept, {file} is as it was\n"))
-            self.assertEqual(file.read_bytes(), before)
-
-    def test_one_stage_leaves_the_sizes_of_the_others(self):
-        file = self.new_folder() / "tuning.json"
-        tune = ["tune", "--file", file, *TUNE]
-        self.assert_works(*tune, "ForwardWarp")
-        kept = json.loads(file.read_text())
-        sizes = next(iter(kept.values()))
-        sizes.update(tile_width=96, tile_height=8, warp_band_rows=3)
-        file.write_text(json.dumps(kept))
-        self.assert_works(*tune, "ForwardWarp")
-        after = next(iter(json.loads(file.read_text()).values()))
-        self.assertNotEqual(after["warp_band_rows"], 3)
-        self.assertEqual({**after, "warp_band_rows": 3}, sizes)
-        before = file.read_bytes()
-        for of_gpus in ("SearchBand", "VerticalAlignment"):
-            self.assert_refused([*tune, of_gpus], f"--stage {of_gpus}", "CPU", "another stage")
-        self.assertEqual(file.read_bytes(), before)
-
-    def test_a_stage_of_first_frames_alone_has_times(self):
-        told = self.assert_works("tune", "--file", self.new_folder() / "tuning.json", "--width", 64, "--height", 24, "--disparities", 16, "--rounds", 2,
-                                 "--stage", "SpeckleRemoval")
-        self.assertRegex(told, r"^SpeckleRemoval: ")
-        self.assertNotIn(" 0.000 ms", told)
-
-    def test_groups_that_a_gpu_has_not_are_left_out(self):
-        gpu = dict(os.environ, OPENCL_LAYERS=os.environ["EGOSGM_GPU_LAYER"], POCL_MAX_WORK_GROUP_SIZE="64")
-        told = self.assert_works("tune", "--file", self.new_folder() / "tuning.json", "--width", 64, "--height", 24, "--disparities", 16, "--rounds", 2,
-                                 "--stage", "SearchBand", env=gpu)
-        self.assertEqual(re.findall(r"row_group (\d+) +not on this device", told), ["128", "256"])
-
-    def test_a_file_that_is_no_tuning_file_stays(self):
-        folder = self.new_folder()
-        tune = ["tune", *TUNE, "ForwardWarp", "--file"]
-        (folder / "tuning.json").write_text('{"another, driver 1": {"tile_width": 96, "tile_height": 8}}')
-        self.assert_works(*tune, folder / "tuning.json")
-        self.assert_works(*tune, folder / "tuning.json")
-        stored = json.loads((folder / "tuning.json").read_text())
-        self.assertEqual((len(stored), stored["another, driver 1"]), (2, {"tile_width": 96, "tile_height": 8}))
-        self.assert_works("run", "--odometry", self.street, "--frames", "0", *METHOD, "--out", folder / "out", "--tuning", folder / "tuning.json")
-        for name, text in (("shape.json", '{"a, driver b": {"hello": 3}}'), ("number.json", '{"a": 7}'), ("list.json", "[]"), ("text.json", "mine")):
-            (folder / name).write_text(text)
-            self.assert_refused_and_untouched(folder, [*tune, folder / name], name)

@@ -4,16 +4,16 @@ import unittest
 
 import numpy
 
-import report_test
+from browser import CHROMIUM, Browser
 from program_case import HAS_PACKAGE, egosgm
 
 
-@unittest.skipUnless(report_test.CHROMIUM and HAS_PACKAGE, "no Chromium, or no Python package beside the program")
+@unittest.skipUnless(CHROMIUM and HAS_PACKAGE, "no Chromium, or no Python package beside the program")
 class LiveInBrowser(unittest.TestCase):
     def test_the_page_shows_what_is_newest_and_says_when_it_ends(self):
         self.assertIn("--side-by-side", egosgm("live", "--help").stdout)  # with it the package can be loaded
         from egosgm import live
-        page, browser = live.Page(), report_test.Browser()
+        page, browser = live.Page(), Browser()
         self.addCleanup(browser.close)
         browser.call("Page.navigate", url=page.address)
         for width in (16, 24, 32):

@@ -1,15 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs that end early: full disks, interrupts, kills; and runs that go on or are replaced."""
+"""Runs that end early: full disks, interrupts, lost devices."""
 import json
 import os
-import pathlib
 import resource
 import shutil
 import signal
 import subprocess
 import time
 
-from program_case import FRAMES, HAS_PACKAGE, HEIGHT, PROGRAM, WIDTH, ProgramTest, as_nobody, egosgm, grey_png, with_small_disk, without_waiting
+from program_case import FEW_KERNELS, FRAMES, HAS_PACKAGE, HEIGHT, PROGRAM, WIDTH, ProgramTest, as_nobody, egosgm, grey_png, with_small_disk, without_waiting
 
 
 class LongRuns(ProgramTest):
@@ -95,7 +94,7 @@ class Disk(LongRuns):
         a reader that waits, once a compiler has run, as here with an empty cache."""
         frames, out = FRAMES + 1, self.new_folder()
         gpu = dict(os.environ, OPENCL_LAYERS=os.environ["EGOSGM_GPU_LAYER"], POCL_CACHE_DIR=str(self.new_folder()))
-        process = self.start(self.street_of(frames), out, "--disparities", 16, env=gpu)
+        process = self.start(self.street_of(frames), out, "--disparities", 16, *FEW_KERNELS, env=gpu)
         while not (out / "disparity/000002.png").exists():  # after which its line finds no room
             self.assertIsNone(process.poll())
             time.sleep(0.01)
@@ -116,26 +115,12 @@ class Disk(LongRuns):
             except OSError:  # nobody reads it yet
                 self.assertIsNone(process.poll())
                 time.sleep(0.01)
+        time.sleep(0.1)  # until it has seen the writer, which a busy machine may do later: then it waits for another one
         process.send_signal(signal.SIGINT)
         os.close(writer)
         _, errors = process.communicate(timeout=900)
         self.assertEqual((process.returncode, errors), (130, "egosgm: interrupted\n"))
         self.assertFalse(out.exists())
-
-    def assert_leaves_out(self, broken, *named):
-        """A run over a long sequence whose last pair `broken(street)` breaks while it runs."""
-        street, out = self.long_street(), self.new_folder()
-        process = self.start(street, out, lines=2)
-        broken(street)
-        _, errors = process.communicate(timeout=900)
-        self.assertEqual((process.returncode, errors), (0, ""))
-        report = self.report(out)
-        self.assertTrue(report["finished"])
-        self.assertEqual([one["frame"] for one in report["left_out"]], [self.LONG - 1])
-        for text in named:
-            self.assertIn(text, report["left_out"][0]["why"])
-        self.assertEqual(self.assert_whole(out), self.LONG - 1)
-        self.assertEqual(len(report["frames"]), self.LONG - 1)
 
     def test_what_others_put_there_while_it_runs_stays(self):
         street = self.long_street()
@@ -164,11 +149,23 @@ class Disk(LongRuns):
         self.assertEqual((process.returncode, without_waiting(errors)), (1, f"egosgm: error: --out {out}: another run has begun there meanwhile: choose another folder\n"))
         self.assertEqual({file: file.read_bytes() for file in out.rglob("*") if file.is_file()}, files)
 
-    def test_a_file_that_vanishes_changes_size_or_is_cut(self):
-        last = f"image_0/{self.LONG - 1:06d}.png"
-        for words, breaks in (("cannot be read", pathlib.Path.unlink), ("", lambda file: file.write_bytes(grey_png(WIDTH, HEIGHT + 1))), ("truncated", lambda file: os.truncate(file, 1000))):
-            with self.subTest(words):
-                self.assert_leaves_out(lambda street: breaks(street / last), last, words)
+    def test_files_that_vanish_change_size_or_are_cut(self):
+        """The last ones of a long sequence, while it runs."""
+        street, out = self.long_street(), self.new_folder()
+        last = [street / f"image_0/{i:06d}.png" for i in range(self.LONG - 3, self.LONG)]
+        process = self.start(street, out, lines=2)
+        last[0].unlink()
+        last[1].write_bytes(grey_png(WIDTH, HEIGHT + 1))
+        os.truncate(last[2], 1000)
+        _, errors = process.communicate(timeout=900)
+        self.assertEqual((process.returncode, errors), (0, ""))
+        report = self.report(out)
+        self.assertTrue(report["finished"])
+        self.assertEqual([one["frame"] for one in report["left_out"]], list(range(self.LONG - 3, self.LONG)))
+        for one, file, words in zip(report["left_out"], last, ("cannot be read", f"{WIDTH}x{HEIGHT + 1}", "truncated"), strict=True):
+            self.assertIn(str(file), one["why"])
+            self.assertIn(words, one["why"])
+        self.assertEqual((self.assert_whole(out), len(report["frames"])), (self.LONG - 3, self.LONG - 3))
 
     def cut_short(self, *arguments, lines=1):
         """The program's exit code and standard error where the reader of its standard output goes after some lines."""
@@ -221,26 +218,8 @@ class Disk(LongRuns):
         out, cache = self.new_folder(), self.new_folder()
         for folder in (self.folder, out):
             folder.chmod(0o755)
-        self.assert_refused(["run", "--odometry", self.street, "--out", out], out, "Permission denied", code=1, **as_nobody(cache))
+        self.assert_refused(["run", "--odometry", self.street, "--out", out, *FEW_KERNELS], out, "Permission denied", code=1, **as_nobody(cache))
         self.assertEqual(list(out.iterdir()), [])
-
-
-class Killed(LongRuns):
-    """A run that was killed goes on, or the user removes its folder."""
-
-    def test_it_goes_on_and_a_new_run_says_how(self):
-        street, out = self.long_street(), self.new_folder()
-        process = self.start(street, out, "--write", "variance", lines=3)
-        process.kill()
-        process.communicate()
-        self.assertFalse(self.report(out)["finished"])
-        (out / "notes.txt").write_text("mine")
-        run = ["run", "--odometry", street, "--out", out, "--write", "variance"]
-        self.assert_refused_and_untouched(out, run, out, "is not empty", "--resume", "removed by hand")
-        self.assert_works(*run, "--resume")
-        self.assertTrue(self.report(out)["finished"])
-        self.assertEqual(self.assert_whole(out), self.LONG)
-        self.assertEqual((out / "notes.txt").read_text(), "mine")
 
 
 class Fallback(LongRuns):
@@ -282,125 +261,3 @@ class Fallback(LongRuns):
         out = self.new_folder() / "out"
         self.assert_refused(["run", self.street, "--out", out, "--fallback", "no such device"], "no such device")
         self.assertFalse(out.exists())
-
-
-class Resume(LongRuns):
-    """An earlier run in OUT: in the way, replaced, or gone on with."""
-    FRAMES = 12
-    KINDS = ("--write", "variance,color,search")
-
-    def assert_same_run(self, out, expected):
-        files = sorted(file.relative_to(expected) for file in expected.rglob("*") if file.is_file())
-        self.assertEqual(sorted(file.relative_to(out) for file in out.rglob("*") if file.is_file()), files)
-        for file in files:
-            if file.name != "report.json":
-                self.assertEqual((out / file).read_bytes(), (expected / file).read_bytes(), file)
-        mine, undisturbed = self.report(out), self.report(expected)
-        for report in (mine, undisturbed):
-            for frame in report["frames"]:
-                del frame["ms"]
-        self.assertEqual(mine, undisturbed)
-
-    def test_equals_an_undisturbed_run(self):
-        street, expected = self.street_of(self.FRAMES), self.new_folder()
-        self.assert_works("run", "--odometry", street, "--out", expected, *self.KINDS)
-        for stop in (signal.SIGKILL, signal.SIGINT):
-            out = self.new_folder()
-            for lines in (3, 5):
-                process = self.start(street, out, "--resume", *self.KINDS, lines=lines)
-                process.send_signal(stop)
-                process.communicate()
-                self.assertLess(self.assert_whole(out, at_least=lines), self.FRAMES)
-            kept = {file: file.stat().st_ino for file in out.rglob("0*.*")}
-            self.assertGreaterEqual(len(kept), 4 * 3)
-            self.assert_works("run", "--odometry", street, "--out", out, "--resume", *self.KINDS)
-            self.assert_same_run(out, expected)
-            for file, inode in kept.items():
-                self.assertEqual(file.stat().st_ino, inode, f"{file} was there and was written again")
-
-    def test_goes_on_only_with_what_it_would_make_itself(self):
-        """Another image, or other poses in the same file, would make one sequence of two."""
-        street = self.broken_street()
-        poses = street.parent / "mine.txt"
-        rows = (street / "poses.txt").read_text().splitlines()
-        poses.write_text("\n".join(rows) + "\n")
-        run = ["run", "--odometry", street, "--poses", poses, "--quiet", "--resume", "--out"]
-
-        def broken(what):
-            out = self.new_folder() / "out"
-            self.assert_works(*run, out)
-            (out / f"disparity/{FRAMES - 1:06d}.png").unlink()
-            what()
-            self.assert_refused_and_untouched(out / "disparity", [*run, out], "--resume", "disparity/000001.png", "another --out")
-
-        broken(lambda: poses.write_text("\n".join([rows[0], rows[2], rows[1], rows[3]]) + "\n"))
-        broken(lambda: shutil.copy(street / "image_0/000002.png", street / "image_0/000001.png"))
-
-    def test_fewer_frames_leave_the_run_as_it_is(self):
-        """Also where names are times."""
-        folder = self.new_folder()
-        for side, name in ((0, "left"), (1, "right")):
-            (folder / name).mkdir()
-            for i in range(FRAMES):
-                shutil.copy(self.street / f"image_{side}/{i:06d}.png", folder / name / f"{1300 + i}.25.png")
-        shutil.copy(self.street / "calib.txt", folder)
-        for street, first_map in ((self.street, "000002.png"), (folder, "1302.25.png")):
-            out = self.ran(street, "--disparities", 16)
-            self.assert_refused_and_untouched(out, ["run", street, "--disparities", 16, "--out", out, "--frames", "0:1", "--resume"],
-                                              "--resume", f"disparity/{first_map}", "give the frames", "another --out")
-
-    def test_a_finished_run_stays_where_it_cannot_be_made_again(self):
-        for broken in (FRAMES - 1, FRAMES - 2):  # the last frame alone; one on which the next rests, too
-            street = self.broken_street()
-            out, image = self.ran(street), street / f"image_1/{broken:06d}.png"
-            os.truncate(image, 1000)
-            self.assert_refused_and_untouched(out, ["run", street, "--out", out, "--resume"], "--resume", f"disparity/{broken:06d}.png", image, "another --out")
-
-    def test_a_finished_run_that_left_a_pair_out_stays_too(self):
-        street = self.broken_street()
-        image = street / f"image_1/{FRAMES - 1:06d}.png"
-        whole = image.read_bytes()
-        os.truncate(image, 1000)
-        out = self.ran(street)
-        run = ["run", street, "--out", out, "--quiet"]
-        image.write_bytes(whole)
-        self.assert_refused_and_untouched(out, [*run, "--resume"], f"disparity/{FRAMES - 1:06d}.png", "left out", "another --out")
-        os.truncate(image, 1000)
-        os.truncate(street / "image_0/000000.png", 1000)
-        self.assert_refused_and_untouched(out, [*run, "--resume"], "disparity/000000.png", "another --out")
-
-    def test_a_run_that_lost_its_device_goes_on_there(self):
-        """By a report that says so: another device than the one that is here cannot be had."""
-        out = self.ran(self.street, "--frames", ":1")
-        run = ["run", self.street, "--out", out]
-        report = json.loads((out / "report.json").read_text())
-        lost = report["device"]
-        report["device"] = {**lost, "name": "another one"}
-        (out / "report.json").write_text(json.dumps(report))
-        self.assert_refused([*run, "--resume"], "device/name", "another one")
-        report["fallback"] = {"from": lost, "why": "it is gone"}
-        (out / "report.json").write_text(json.dumps(report))
-        self.assert_works(*run, "--resume")
-        self.assertEqual(self.assert_whole(out), FRAMES)
-
-    def test_names_that_are_no_utf8(self):
-        name = os.fsencode(self.new_folder()) + b"/b\xffseq"
-        shutil.copytree(os.fsencode(self.street), name)
-        sequence, out = os.fsdecode(name), self.new_folder() / "out"
-        run = ["run", sequence, "--disparities", 16, "--out", out, "--quiet"]
-        self.assert_works(*run)
-        self.assert_works(*run, "--resume")
-        self.assert_works("report", out)
-        maps = os.fsdecode(name + b"/truth/left_disp_noc")
-        self.assertEqual(len(self.json_of("eval", maps, maps)["pairs"]), FRAMES)
-
-    def test_other_settings_cannot_go_on(self):
-        out = self.ran(self.street, "--frames", ":1")
-        run = ["run", self.street, "--out", out]
-        self.assert_all_refused((("--set p2=99", "p2", "190", "99"), ("--poses {street}/poses.txt", "motion")), [*run, "--resume"])
-        self.assert_works(*run, "--resume")
-        self.assertEqual(self.assert_whole(out), FRAMES)
-        (out / "report.json").write_text("[]")
-        self.assert_refused([*run, "--resume"], out / "report.json")
-        (out / "report.json").unlink()
-        self.assert_refused([*run, "--resume"], out, "report.json", "another --out")

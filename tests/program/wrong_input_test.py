@@ -35,6 +35,7 @@ COMMANDS = (
     ("synth --out {never} --seed -1", "-1 is no value for it"), ("synth --out {never} --seed 100000000000000000000", "100000000000000000000 is no value for it"),
     ("synth --out {never} --frames 0", "frames"), ("synth --out {never} --width wide", "wide"),
     ("", "subcommand"), ("run", "--out"), ("run --out {never}", "--odometry"), ("run --left a.png --out {never}", "--right"),
+    ("odometry {street} --out {never} --max-rotation -1", "max_rotation_deg"), ("run {street} --out {never} --max-translation 0", "max_translation_m"),
     ("run --kitti {street} --out {never}", "--scene"), ("run --left a%d.png --right b%d.png --calib c --pair-by luck --out {never}", "luck"),
     ("run nix.png {street}/image_1/000000.png --out {never}", "nix.png: no such file; give the left and the right picture"),
     ("run nix.mp4 nixes.mp4 --out {never}", "nix.mp4: no such file; give the left and the right picture"),
@@ -126,7 +127,7 @@ class BrokenInput(ProgramTest):
         images = {file: file.read_bytes() for file in (street / "image_0").iterdir()}
         for file in images:
             file.write_bytes(b"no image")
-        self.assert_sequence_refused(street, f"{FRAMES} of {FRAMES} pairs could not be read")
+        self.assert_sequence_refused(street, f"{FRAMES} of {FRAMES} pairs could not be read: {street}/image_0/000000.png")
         empty = self.new_folder()
         self.assert_refused(["run", street, "--out", empty], "could not be read")
         self.assertEqual(list(empty.iterdir()), [])

@@ -135,7 +135,7 @@ def test_a_range_beyond_the_usual_is_said_and_nothing_of_it_is_lost(tmp_path, st
     for least, disparities in ((-40, 80), (40, 48)):
         out = tmp_path / f"{least}.mcap"
         bag = record("mcap", tmp_path / f"drive{least}", street, frames)
-        told = program("--bag", bag, *TOPICS, "--out", out, "--set", f"min_disparity={least}", "--set", f"disparities={disparities}", "--quiet")
+        told = program("--bag", bag, *TOPICS, "--out", out, "--set", f"min_disparity={least}", "--set", f"disparities={disparities}", "--set", "paths=4", "--quiet")
         assert told.returncode == 0, told.stderr
         with AnyReader([out]) as reader:
             for connection, _, raw in reader.messages(connections=[c for c in reader.connections if c.topic == "/egosgm/disparity"]):

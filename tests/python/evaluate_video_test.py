@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import egosgm
+from egosgm.evaluation import video_counts
 from refusals import expect_refused
 
 NO = egosgm.INVALID_DISPARITY
@@ -225,13 +226,14 @@ def test_harm_and_help():
 
 
 def test_gained_lost_and_trusted():
-    estimate, against, truth = (np.float32([row]) for row in ([10, 20, 20, NO, NO, 10, NO, 2], [NO, NO, 10, 10, 20, 20, 0, NO], [10] * 6 + [0] * 2))
-    reasons = np.uint8([[0, 0, egosgm.REASONS.index("flat")] + [0] * 5])
+    estimate, against, truth = (np.float32([row]) for row in ([10, 20, 20, NO, NO, 10, NO, 2, 5], [NO, NO, 10, 10, 20, 20, 0, NO, NO], [10] * 6 + [0] * 3))
+    flat = egosgm.REASONS.index("flat")
+    reasons = np.uint8([[0, 0, flat] + [0] * 5 + [flat]])
     result = egosgm.evaluate_video([estimate], [truth], against=[against], reasons=[reasons])
     figures = result.figures
-    assert (figures.gained_percent, figures.gained_right_percent, figures.lost_right_percent) == pytest.approx((300 / 8, 200 / 3, 200 / 8))
-    assert (figures.wrong_of_trusted_percent, figures.trusted_of_wrong_percent) == (25, 50)
-    assert (result.regions["sky"].filled, result.regions["all"].wrong_of_all, result.regions["sky"].gained_right_percent) == (50, 25, 100)
+    assert (figures.gained_percent, figures.gained_right_percent, figures.lost_right_percent) == pytest.approx((400 / 9, 50, 200 / 9))
+    assert (figures.wrong_of_trusted_percent, figures.trusted_of_wrong_percent) == pytest.approx((25, 100 / 3))
+    assert (result.regions["sky"].filled, result.regions["all"].wrong_of_all, result.regions["sky"].gained_right_percent) == pytest.approx((200 / 3, 100 / 3, 50))
 
 
 def half_up(value):
@@ -344,7 +346,6 @@ def test_opw_leaves_out_what_does_not_look_alike():
 
 
 def test_the_order_is_that_of_a_stable_sort():
-    from egosgm.evaluation import video_counts
     values = np.random.default_rng(8).normal(0, 1e3, 5000).round().astype(np.float32)
     values[::7], values[::11] = 0.0, -0.0
     np.testing.assert_array_equal(video_counts._order(values), np.argsort(values, kind="stable"))

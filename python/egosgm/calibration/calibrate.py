@@ -147,7 +147,7 @@ class _Views:
         if len(self.views) < _FEWEST_VIEWS:
             there = other_size(without, columns, rows) if not board.is_charuco and not self.views else None
             hint = f"; one of {there[0]}x{there[1]} is there: inner corners count, where four squares meet" if there else \
-                "; give more pictures of the whole board in both images at once, sharp and evenly lit"
+                f"; is it {board.name}?" * (board.is_charuco and not any(self.found)) + "; give more pictures of the whole board in both images at once, sharp and evenly lit"
             raise _egosgm.InvalidArgument(f"{board.name} was found in {self.found[0]} left and {self.found[1]} right images of {counted(self.pairs, 'pair')}, in "
                                           f"both at once in {len(self.views)}; {_FEWEST_VIEWS} are needed{hint}" + (f"; {self.note}" if self.note else ""))
 

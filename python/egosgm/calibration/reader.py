@@ -282,3 +282,8 @@ def read_calibration(file: "_Path | Sequence[_Path]", unit_m: Optional[float] = 
     StereoRig. file: one, or (left, right). size: (width, height) of the images: it chooses in a ZED's file, and a
     calibration of rectified images of another size is refused."""
     return find(file, unit_m, is_fisheye, size)
+
+
+def any_calibration(width: int, height: int) -> _egosgm.Calibration:
+    """In place of one that is not known: nothing is predicted then, so that any one does."""
+    return _egosgm.Calibration(width, width, width / 2, height / 2, 1)

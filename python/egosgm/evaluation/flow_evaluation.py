@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import _egosgm
-from .video_counts import BAD_PX, disparity_of, expect_indexable, flow_of, is_sky, is_valid, map_of, size_text
+from .maps import disparity_of, expect_indexable, flow_of, is_valid, map_of, size_text
+from .regions import BAD_PX, is_sky
 from .video_evaluation import percent
 
 MEASURES = ("d1", "d2", "fl", "sf")

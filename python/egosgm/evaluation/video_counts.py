@@ -2,46 +2,22 @@
 """Counts of a video's frames, each alone and with the frame before: errors, changes, regions, uncertainty. docs/use/evaluation.md has the formulas."""
 import collections
 import concurrent.futures
-import dataclasses
 import math
 import os
 from typing import Any, Callable, Deque, Dict, Iterable, Iterator, Optional, Tuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from .. import _egosgm
-from .pose_evaluation import inverse, poses_of
+from .maps import Frame, is_valid, size_text
+from .moved_maps import move, move_map
+from .pose_evaluation import inverse
+from .regions import BAD_PX, HIDDEN_PX, REGIONS, comparison_masks, region_masks, trust_masks
 
-_NONE = _egosgm.INVALID_DISPARITY
-BAD_PX = 3.0
-SKY_PX = 1 / 256              # a truth from 0 to this says that nothing is there
-CHANGED_PX = 1.0              # two methods differ
-HIDDEN_PX = 1.0               # something else is in front: it is nearer than expected by more than this
 TINY_CHANGE_PX = 1e-3         # CODD's, against division by zero
-EDGE_PX, EDGE_REACH = 3.0, 3  # a jump between neighbours, and the pixels around it
 LARGEST_FLOW_PX = 250.0
 SHARES = np.arange(2, 101, 2)       # percent of the pixels with truth, estimate and uncertainty
 DENSITIES = np.arange(50, 101, 5)   # percent of the pixels with truth
-_BAND_ROWS = 16
-REGIONS = ("all", "moving", "still", "uncovered", "edges", "near", "far", "sky")
-
-
-@dataclasses.dataclass
-class Frame:
-    """What is known of one frame: arrays of one size, None where there is none. Disparities are in px, masks are of bool."""
-
-    estimate: np.ndarray
-    truth: Optional[np.ndarray] = None         # of the pixels that count
-    all_truth: Optional[np.ndarray] = None     # of occluded pixels too; without it, `truth`
-    against: Optional[np.ndarray] = None       # another method's estimate
-    uncertainty: Optional[np.ndarray] = None   # any number that grows with the expected error
-    moving: Optional[np.ndarray] = None        # what moves by itself
-    image: Optional[np.ndarray] = None         # uint8 or uint16: the left image
-    flow_to_next: Optional[np.ndarray] = None  # H x W x 2 [px], NaN where there is none
-    next_truth: Optional[np.ndarray] = None    # the next frame's truth at this frame's pixels
-    reason: Optional[np.ndarray] = None        # uint8, as Frame.reason
-    filled: Optional[np.ndarray] = None        # the estimate after interpolate_background, where there is a truth
 
 
 class Counts(Dict[str, Any]):
@@ -66,61 +42,6 @@ class VideoCounts:
         self.sums.add(other.sums)
         for name, counts in other.regions.items():
             self.regions[name].add(counts)
-
-
-def is_valid(disparity: np.ndarray) -> np.ndarray:
-    return np.isfinite(disparity) & (disparity > _NONE)
-
-
-def is_sky(truth: np.ndarray) -> np.ndarray:
-    return (truth >= 0) & (truth <= SKY_PX)
-
-
-def is_bad(estimate: np.ndarray, truth: np.ndarray) -> np.ndarray:
-    return np.abs(truth - estimate) > BAD_PX
-
-
-def is_right(estimate: np.ndarray, truth: np.ndarray) -> np.ndarray:
-    """An estimate that is not bad, or none where nothing is."""
-    return np.where(is_valid(estimate), ~is_bad(estimate, truth), is_sky(truth))
-
-
-def move(disparity: np.ndarray, calibration: Any, motion: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where each pixel comes to lie: (whether in the image, place in the flattened map, disparity there). The place is of the nearest pixel, halves to the
-    even one; it is 0 where it is nowhere: at infinity or beyond, behind the camera, outside of the image."""
-    height, width = disparity.shape
-    inside, place, there = np.empty(disparity.shape, bool), np.empty(disparity.shape, np.intp), np.empty(disparity.shape)
-    x = (np.arange(width) - calibration.cx) / calibration.fx
-    for top in range(0, height, _BAND_ROWS):  # what a band needs stays in the cache
-        rows = slice(top, top + _BAND_ROWS)
-        band = disparity[rows]
-        y = ((np.arange(height)[rows] - calibration.cy) / calibration.fy)[:, None]
-        with np.errstate(all="ignore"):
-            shifted = np.where(is_valid(band), band, np.nan) + np.float64(calibration.doffs_px)
-            inverse_depth = shifted / (calibration.fx * calibration.baseline_m)
-            inverse_depth[~(inverse_depth > 0)] = np.nan
-            to_x, to_y, z = (row[0] * x + (row[1] * y + row[2]) + row[3] * inverse_depth for row in motion[:3])
-            z[~(z > 0)] = np.nan
-            to_x, to_y = np.rint(calibration.fx * to_x / z + calibration.cx), np.rint(calibration.fy * to_y / z + calibration.cy)
-            inside[rows] = (to_x >= 0) & (to_x < width) & (to_y >= 0) & (to_y < height)
-            place[rows] = np.where(inside[rows], to_y * width + to_x, 0)
-            there[rows] = shifted / z - calibration.doffs_px
-    return inside, place, there
-
-
-def move_map(disparity: ArrayLike, calibration: Any, current_from_previous: ArrayLike) -> np.ndarray:
-    """A disparity map as the next frame sees it, the nearest surface on top; INVALID_DISPARITY where nothing lies."""
-    before = disparity_of(disparity, "disparity")
-    inside, place, there = move(before, calibration, poses_of([current_from_previous], "current_from_previous")[0])
-    with np.errstate(invalid="ignore"):
-        inside &= there > _NONE
-    place, value = place[inside], there[inside].astype(np.float32)
-    moved = np.full(before.size, _NONE, np.float32)
-    while len(place):  # of those that meet, any is written, and the larger ones go on
-        moved[place] = value
-        larger = value > moved[place]
-        place, value = place[larger], value[larger]
-    return moved.reshape(before.shape)
 
 
 def _changes(name: str, error: np.ndarray) -> Counts:
@@ -262,42 +183,6 @@ def _density(frame: Frame) -> Counts:
     return counts
 
 
-def _edges(truth: np.ndarray) -> np.ndarray:
-    """What lies within EDGE_REACH rows and columns of a pixel beside a jump between two neighbours with truth."""
-    beside = np.zeros(truth.shape, bool)
-    known = np.where(is_valid(truth), truth, np.nan)
-    for axis in (0, 1):
-        with np.errstate(invalid="ignore"):
-            jump = np.swapaxes(np.abs(np.diff(known, axis=axis)) > EDGE_PX, 0, axis)
-        view = np.swapaxes(beside, 0, axis)
-        view[:-1] |= jump
-        view[1:] |= jump
-    for axis in (0, 1):
-        source, view = np.swapaxes(beside.copy(), 0, axis), np.swapaxes(beside, 0, axis)
-        for reach in range(1, EDGE_REACH + 1):
-            view[reach:] |= source[:-reach]
-            view[:-reach] |= source[reach:]
-    return beside
-
-
-def _regions(now: Frame, before: Optional[Frame], calibration: Optional[Any], motion: Optional[np.ndarray], near_px: float) -> Dict[str, np.ndarray]:
-    """Masks of pixels that have truth, by the names of the regions; without those that are not known."""
-    known = is_valid(now.truth)
-    masks = {"all": known, "edges": known & _edges(now.truth if now.all_truth is None else now.all_truth), "near": known & (now.truth >= near_px),
-             "sky": known & is_sky(now.truth)}
-    masks["far"] = known & ~masks["near"]
-    if now.moving is not None:
-        masks["moving"], masks["still"] = known & now.moving, known & ~now.moving
-    all_before = None if before is None else before.truth if before.all_truth is None else before.all_truth
-    if all_before is not None and motion is not None:
-        inside, place, then = move(now.truth, calibration, inverse(motion))
-        there = all_before.ravel()[place]
-        with np.errstate(invalid="ignore"):
-            hidden = is_valid(there) & (there > then + HIDDEN_PX)
-        masks["uncovered"] = masks.get("still", known) & (~inside | hidden)
-    return masks
-
-
 def _same_pixel(before: Frame, now: Frame, name: str, which: str) -> Callable[[np.ndarray], Counts]:
     """DynamicStereo's TEPE of the pixels of a region."""
     known = is_valid(before.truth) & is_valid(now.truth)
@@ -307,31 +192,12 @@ def _same_pixel(before: Frame, now: Frame, name: str, which: str) -> Callable[[n
     return lambda region: _changes(name, error[region & known])
 
 
-def _beside(estimate: np.ndarray, against: np.ndarray, truth: np.ndarray) -> Dict[str, np.ndarray]:
-    """What another method has there: masks of pixels, as far as they have truth."""
-    has, had = is_valid(estimate), is_valid(against)
-    right = is_right(estimate, truth)
-    both, gained = has & had, has & ~had
-    with np.errstate(invalid="ignore"):
-        e, a, t = (values.astype(float) for values in (estimate, against, truth))
-        changed = both & (np.abs(e - a) > CHANGED_PX)
-        difference = np.abs(e - t) - np.abs(a - t)
-    return {"both": both, "changed": changed, "worse": changed & (difference > 0), "better": changed & (difference < 0), "beside": np.ones(has.shape, bool),
-            "gained": gained, "gained_right": gained & right, "lost_right": had & is_right(against, truth) & ~right}
-
-
-def _trust(estimate: np.ndarray, truth: np.ndarray, reason: np.ndarray) -> Dict[str, np.ndarray]:
-    valid, trusted = is_valid(estimate), reason == _egosgm.REASONS.index("trusted")
-    bad = valid & is_bad(estimate, truth)
-    return {"bad": bad, "trusted": valid & trusted, "trusted_bad": bad & trusted}
-
-
 def _count_regions(now: Frame, before: Optional[Frame], masks: Dict[str, np.ndarray], counts: VideoCounts) -> None:
     marked: Dict[str, np.ndarray] = {}
     if now.against is not None:
-        marked.update(_beside(now.estimate, now.against, now.truth))
+        marked.update(comparison_masks(now.estimate, now.against, now.truth))
     if now.reason is not None:
-        marked.update(_trust(now.estimate, now.truth, now.reason))
+        marked.update(trust_masks(now.estimate, now.truth, now.reason))
     changes = []
     if before is not None and before.truth is not None:
         changes = [_same_pixel(before, now, "tepe", "estimate"), _same_pixel(before, now, "filled", "filled")]
@@ -339,7 +205,7 @@ def _count_regions(now: Frame, before: Optional[Frame], masks: Dict[str, np.ndar
         if not mask.any():
             continue
         region = counts.regions[name]
-        region.add({"errors": _egosgm.compare_disparity(now.estimate, np.where(mask, now.truth, np.float32(_NONE)))})
+        region.add({"errors": _egosgm.compare_disparity(now.estimate, np.where(mask, now.truth, np.float32(_egosgm.INVALID_DISPARITY)))})
         region.add({what: np.count_nonzero(where & mask) for what, where in marked.items()})
         for change in changes:
             region.add(change(mask))
@@ -349,7 +215,7 @@ def _count(now: Frame, before: Optional[Frame], calibration: Optional[Any], moti
     """Of a frame, and of the pair with the one before."""
     counts = VideoCounts()
     if now.truth is not None:
-        _count_regions(now, before, _regions(now, before, calibration, motion, near_px), counts)
+        _count_regions(now, before, region_masks(now, before, calibration, motion, near_px), counts)
         if now.uncertainty is not None:
             counts.sums.add(_density(now))
     if before is None:
@@ -392,32 +258,3 @@ def count_frames(frames: Iterable[Frame], calibration: Optional[Any] = None, mot
                 yield started.popleft().result()
         for counts in started:
             yield counts.result()
-
-
-def size_text(array: np.ndarray) -> str:
-    return f"{array.shape[1]}x{array.shape[0]}"
-
-
-def expect_indexable(items: Any, name: str) -> None:
-    if not hasattr(items, "__len__") or not hasattr(items, "__getitem__"):
-        raise _egosgm.InvalidArgument(f"{name} is a {type(items).__name__}: give a list of maps, or anything with a length and []")
-
-
-def map_of(item: Any, name: str) -> np.ndarray:
-    if np.ma.is_masked(item):
-        raise _egosgm.InvalidArgument(f"{name}: has a mask, which nobody looks at: give its filled(egosgm.INVALID_DISPARITY)")
-    array = np.asarray(item, np.float32)
-    if array.ndim != 2 or not array.size:
-        raise _egosgm.InvalidArgument(f"{name}: an array of shape {array.shape}: give H x W arrays")
-    return np.where(np.isfinite(array), array, np.float32(np.nan))
-
-
-def disparity_of(item: Any, name: str) -> np.ndarray:
-    return map_of(_egosgm._disparity_map(item, name), name)
-
-
-def flow_of(item: Any, name: str) -> np.ndarray:
-    flow = np.asarray(item, np.float32)
-    if flow.ndim != 3 or flow.shape[2] != 2 or not flow.size:
-        raise _egosgm.InvalidArgument(f"{name}: an array of shape {flow.shape}: give H x W x 2 arrays")
-    return flow

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import _egosgm
+from .maps import Frame, disparity_of, expect_indexable, flow_of, map_of, size_text
 from .pose_evaluation import inverse, poses_of
-from .video_counts import DENSITIES, SHARES, Counts, Frame, VideoCounts, count_frames, disparity_of, expect_indexable, flow_of, map_of, size_text
+from .video_counts import DENSITIES, SHARES, Counts, VideoCounts, count_frames
 
 _Maps = Optional[Sequence[Optional[ArrayLike]]]
 

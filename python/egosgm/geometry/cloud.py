@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .. import _egosgm
 from ..arguments import counted, decimal, left_of_run, Parser, read_json, tell
-from ..evaluation.video_counts import size_text
+from ..evaluation.maps import size_text
 from .points import cloud_of_maps, write_new_ply
 
 
