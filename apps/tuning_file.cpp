@@ -24,6 +24,12 @@ constexpr std::size_t kMaxBytes = 1 << 20;
       fmt::format("{}: {}: move it away and run egosgm tune again, or give --tuning none", file.string(), what));
 }
 
+/// Of one device among others.
+[[noreturn]] void refuse_entry(const std::filesystem::path& file, const std::string& device, const std::string& what) {
+  throw InvalidArgument(fmt::format("{}: of \"{}\": {}: take that entry out of the file and run egosgm tune again",
+                                    file.string(), device, what));
+}
+
 Json read(const std::filesystem::path& file) {
   Json json = parse_json(vision::read_file(file, kMaxBytes), file);
   if (!json.is_object()) refuse(file, "not a tuning file");
@@ -31,7 +37,7 @@ Json read(const std::filesystem::path& file) {
   return json;
 }
 
-Tuning tuning_of(const Json& sizes, const std::filesystem::path& file) {
+Tuning tuning_of(const std::string& device, const Json& sizes, const std::filesystem::path& file) {
   if (!sizes.is_object()) refuse(file, "not a tuning file");
   Tuning tuning;
   try {
@@ -40,7 +46,7 @@ Tuning tuning_of(const Json& sizes, const std::filesystem::path& file) {
     }
     tuning.validate();
   } catch (const InvalidArgument& error) {
-    refuse(file, error.what());
+    refuse_entry(file, device, error.what());
   }
   return tuning;
 }
@@ -57,7 +63,7 @@ std::filesystem::path user_tuning_file() {
 std::optional<Tuning> kept_tuning(const std::filesystem::path& file, const DeviceInfo& device) {
   const Json json = read(file);
   const auto sizes = json.find(tuning_key(device));
-  return sizes == json.end() ? std::nullopt : std::optional(tuning_of(*sizes, file));
+  return sizes == json.end() ? std::nullopt : std::optional(tuning_of(sizes.key(), *sizes, file));
 }
 
 Device tuned_by_argument(const Device& device, const std::string& argument) {
@@ -74,7 +80,7 @@ void expect_tuning_file(const std::filesystem::path& file) {
   vision::expect_writable(file);
   if (!std::filesystem::is_regular_file(file)) return;
   const Json all = read(file);
-  for (const auto& [name, sizes] : all.items()) tuning_of(sizes, file);
+  for (const auto& [device, sizes] : all.items()) tuning_of(device, sizes, file);
 }
 
 void store_tuning(const std::filesystem::path& file, const DeviceInfo& device, const Tuning& tuning) {

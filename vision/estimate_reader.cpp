@@ -98,6 +98,7 @@ void EstimateReader::compare(const Image& estimate, const Image& truth) {
   const auto equal = static_cast<std::size_t>(std::count(ratios.begin(), ratios.end(), 1.0));
   const std::scoped_lock lock(mutex_);
   is_compared_ = true;
+  has_truth_ = has_truth_ || surfaces > 0;
   differs_ = differs_ || equal != surfaces;
   if (ratios.empty()) return;
   ratios_.push_back(middle);
@@ -119,7 +120,10 @@ std::vector<std::string> EstimateReader::warnings(double scale, double truth_sca
         first_impossible_);
   }
   if (markers_ > 0) add(markers_, " values of estimates are ", marker_, ", below 0: they count as missing");
-  if (is_compared_ && ratios_.empty()) {
+  if (is_compared_ && !has_truth_) {
+    add("the truth has no disparity above 1 px in any pixel: is it the right file, and its --truth-scale the right "
+        "one?");
+  } else if (is_compared_ && ratios_.empty()) {
     add("no estimate has a value above 0 where its truth has one: are they of the other sign, or of other frames?");
   }
   if (!ratios_.empty() && !differs_) {

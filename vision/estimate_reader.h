@@ -36,7 +36,7 @@ class EGOSGM_EXPORT EstimateReader {
   std::int64_t impossible_ = 0, values_ = 0, markers_ = 0;
   float marker_ = 0;
   std::string first_impossible_;
-  bool is_compared_ = false, differs_ = false;  // from its truth
+  bool is_compared_ = false, has_truth_ = false, differs_ = false;  // from its truth
   std::vector<double> ratios_, alike_;  // of an estimate to its truth in the median of each map, and the share near it
 };
 

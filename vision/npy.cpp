@@ -22,8 +22,7 @@ constexpr std::string_view kMagic("\x93NUMPY", 6);
 constexpr std::size_t kMaxSides = 64;  // of NumPy itself
 
 [[noreturn]] void refuse(const std::filesystem::path& file, const std::string& why) {
-  throw InvalidArgument(file.string() + ": not a readable .npy (truncated?): " + why +
-                        "; give one H x W array of numbers");
+  throw InvalidArgument(file.string() + ": not a readable .npy: " + why + "; give one H x W array of numbers");
 }
 
 /// The text after `'key':` in the header, without blanks before it.

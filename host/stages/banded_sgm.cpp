@@ -108,18 +108,22 @@ int rows_at_once(const ocl::Context& context, shared::ImageSize size, shared::Di
   while (rows > 0 && !fits(rows, StripeMemory::bytes(size.width, rows, words))) --rows;
   const int least = 3 * BandedSgm::kStripeOverlap;
   if (rows >= least) return fewest_rows(size.height, rows, BandedSgm::kStripeOverlap);
-  const int fewest = std::min(size.height, least);
-  const std::uint64_t needed = demand(context, {size.width, fewest}, range, options, chunks).total +
-                               (fewest < size.height ? StripeMemory::bytes(size.width, fewest, words) : 0);
-  const std::string limit = chosen > 0 && chosen < device_limit
-                                ? "max_memory_mib allows " + std::to_string(chosen >> 20) + " MiB"
-                                : "three quarters of the device are " + std::to_string(memory >> 20) +
-                                      " MiB, of which maps of " + std::to_string(size.width) + "x" +
-                                      std::to_string(size.height) + " leave " + std::to_string(device_limit >> 20) +
-                                      " MiB";
+  const auto needed = [&](int stripe_rows) {
+    return demand(context, {size.width, stripe_rows}, range, options, chunks).total +
+           (stripe_rows < size.height ? StripeMemory::bytes(size.width, stripe_rows, words) : 0);
+  };
+  int fewest = std::min(size.height, least);
+  if (needed(size.height) < needed(fewest)) fewest = size.height;  // it copies nothing
+  const std::string mib = std::to_string((needed(fewest) >> 20) + 1);
+  const std::string needs = "BandedSgm: a stripe of " + std::to_string(fewest) + " rows needs " + mib + " MiB, ";
+  if (chosen > 0 && chosen < device_limit) {
+    throw InvalidArgument(needs + "max_memory_mib allows " + std::to_string(chosen >> 20) + " MiB: raise it to " + mib +
+                          " or more, or choose fewer disparities or a smaller image");
+  }
   throw DeviceError(CL_MEM_OBJECT_ALLOCATION_FAILURE,
-                    "BandedSgm: a stripe of " + std::to_string(fewest) + " rows needs " +
-                        std::to_string((needed >> 20) + 1) + " MiB, " + limit + " and buffers of at most " +
+                    needs + "three quarters of the device are " + std::to_string(memory >> 20) +
+                        " MiB, of which maps of " + std::to_string(size.width) + "x" + std::to_string(size.height) +
+                        " leave " + std::to_string(device_limit >> 20) + " MiB, and buffers of at most " +
                         std::to_string(context.max_allocation_bytes() >> 20) +
                         " MiB: choose fewer disparities, a smaller image or another device");
 }

@@ -44,6 +44,8 @@ class Matcher:
         """A rectified pair of uint8 or uint16: grey, H x W, or colour as cv2.imread gives it, H x W x 3 or 4, BGR or BGRA."""
         left, right = (image[..., 2::-1] if image.ndim == 3 and image.shape[2] in (3, 4) else image for image in map(np.asanyarray, (left, right)))  # with masks, which are refused
         made_for = left.shape[:2], left.dtype
+        if left.ndim == right.ndim == 2 and left.shape != right.shape:
+            raise _egosgm.InvalidArgument(f"left is {left.shape[1]}x{left.shape[0]}, right {right.shape[1]}x{right.shape[0]}: give a pair of one size")
         if self._pipeline is None or made_for != self._made_for:
             if len(made_for[0]) != 2:
                 raise _egosgm.InvalidArgument(f"left is an array of the shape {made_for[0]}: give an image, H x W or H x W x 3")

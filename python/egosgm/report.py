@@ -226,6 +226,7 @@ class _Page:
         moving = ObjectPictures(self._folder, self._run["calibration"])
         for frame in self._shown():
             layers = []
+            frame.left = self._left_of_size(frame)
             for name, picture, bar in self._panels.layers(self._folder, frame.name, frame.left, frame.truth):
                 has_edges = name.startswith("error") or name == "reason"  # ten colours
                 layers.append({"name": name, "picture": _data_uri(_narrowed(picture, self._given.picture_width), "png" if has_edges else "jpeg")})
@@ -243,6 +244,17 @@ class _Page:
                 self._notes.append(f'The run did not write "{kind}": egosgm run --write variance,search does.')
         return {"pictures": pictures, "bars": bars}
 
+    def _left_of_size(self, frame: _Frame) -> str:
+        """The left image, where it has the disparity's size."""
+        if not frame.left:
+            return ""
+        image = _egosgm._read_stored_image(pathlib.Path(frame.left))
+        width, height = self._run["width"], self._run["height"]
+        if image.shape[:2] == (height, width):
+            return frame.left
+        self._notes.append(f"{pathlib.Path(frame.left).name} is {image.shape[1]}x{image.shape[0]} while the run's images were {width}x{height}: it was changed after the run, so it is not shown.")
+        return ""
+
     def _paths(self) -> Dict[str, Any]:
         def from_above(poses: Any) -> List[List[float]]:
             return [(numpy.linalg.inv(poses[0]) @ pose)[[0, 2], 3].tolist() for pose in poses]
@@ -250,8 +262,10 @@ class _Page:
         estimated, true = [], []
         file = self._folder / "poses.txt"
         if file.exists():
-            poses = _egosgm.read_poses(file)
-            estimated = [poses[frame.place] for frame in self._frames if frame.place < len(poses)]
+            if len(poses := _egosgm.read_poses(file)) == len(self._of_run):
+                estimated = poses[[frame.place for frame in self._frames]]
+            else:
+                self._notes.append(f"poses.txt has {len(poses)} poses and report.json {len(self._of_run)} frames: one of them was changed, so the path is not shown.")
         if self._given.poses:
             poses, numbers = _egosgm.read_poses(self._given.poses), [frame.number for frame in self._frames]
             whole = _egosgm._frames_of_run(self._folder).numbers

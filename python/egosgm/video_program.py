@@ -120,6 +120,8 @@ class VideoInput:
             reason = run / "reason" / f"{frame.estimate.stem}.png"
             frame.reason = reason if (run / "report.json").is_file() and reason.is_file() else None
         self._pair("against", given.against, "disparity")
+        if given.against and all(frame.against and frame.against.samefile(frame.estimate) for frame in self.frames):
+            self.notes.append("the estimates are those of --against: is a run compared with itself?")
         self._pair("uncertainty", given.variance, "variance")
         self._pair("uncertainty", given.confidence)
         self._pair("flow", given.flow)
@@ -316,6 +318,8 @@ def _work(arguments: Sequence[str]) -> str:
     for option, file in (("--plot-frames", given.plot_frames), ("--plot-density", given.plot_density)):
         if file:
             plots.expect_plot(option, file)
+    if given.plot_frames and given.plot_density and _Path(given.plot_frames).resolve() == _Path(given.plot_density).resolve():
+        raise _egosgm.InvalidArgument(f"--plot-frames and --plot-density {given.plot_density}: are one file: give each plot a name of its own")
     resolve_comparison(given, truth_is_needed=not given.sequence)
     if not given.truth and (given.scene or _Path(given.sequence, "truth").is_dir()):
         given.truth = given.sequence  # its own

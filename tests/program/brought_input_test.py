@@ -119,7 +119,7 @@ class Doubts(Brought):
 
     def test_a_missing_baseline_is_no_reason_to_exchange_cameras(self):
         f, cx, cy, baseline = self.calibration()
-        for row in ("", f"baseline = {baseline}\n", "baseline_m = 0\n"):
+        for row in ("", f"distance = {baseline}\n", "baseline_m = 0\n"):
             file = self.new_folder() / "calib.txt"
             file.write_text(f"fx = {f}\nfy = {f}\ncx = {cx}\ncy = {cy}\n{row}")
             done = egosgm("doctor", *self.patterns(calib=file))
@@ -342,6 +342,9 @@ class Maps(Brought):
                                     ("sign", -self.truth, "of the other sign"), ("none", numpy.full_like(self.truth, numpy.nan), "no estimate has a value")):
             self.npy(self.maps / f"{name}.npy", values.astype(numpy.float32))
             self.assertIn(named, self.figures(f"{name}.npy")[2], name)
+        for values in (numpy.nan, 0, numpy.inf):
+            self.npy(self.maps / "nothing.npy", numpy.full_like(self.truth, values, numpy.float32))
+            self.assertIn("the truth has no disparity above 1 px in any pixel", self.assert_works("eval", self.maps / "truth.npy", self.maps / "nothing.npy"))
 
     def test_a_scale_that_does_not_apply_is_refused(self):
         maps, truth = self.maps, self.maps / "truth.npy"

@@ -134,6 +134,8 @@ class EvalOverTime(ProgramTest):
         estimate, truth = self.maps([10, 12, 10.5]), self.maps([10, 10, 10])
         out = self.new_folder()
         self.assert_works("eval-video", estimate, truth, "--plot-frames", out / "frames.svg", "--variance", estimate, "--plot-density", out / "density.png")
+        self.assertIn("is a run compared with itself?", self.assert_works("eval-video", estimate, truth, "--against", estimate))
+        self.assertNotIn("is a run compared", self.assert_works("eval-video", estimate, truth, "--against", truth))
         self.assertIn("TEPE same pixel", (out / "frames.svg").read_text())
         self.assertTrue((out / "density.png").read_bytes().startswith(b"\x89PNG"))
 
@@ -154,6 +156,7 @@ class EvalOverTime(ProgramTest):
             (f"{truth} {truth} --scale 0", "positive"), (f"{other} --sequence {{street}}", "000077.png", "no frame of this number"),
             (f"{truth} {truth} --against {small}", "000001.png", "20x10", "320x96"), (f"{broken} {truth}", "000003.png"),
             (f"{truth} {truth} --flow {truth}", "000000.png", "optical flow"), (f"{same} {same} --plot-frames {{never}}.gif", "--plot-frames", ".svg"),
+            (f"{same} {same} --plot-frames {{never}}.svg --variance {same} --plot-density {{never}}.svg", "are one file"),
             (f"{same} {same} --plot-density {{never}}.svg", "--plot-density", "belongs to --variance or --confidence"),
             (f"{same} {same} --next-truth {same}", "--next-truth", "belongs to --flow"),
             (f"{same} --sequence {plain} --mask {same}", "--mask", "belongs to --truth")), ["eval-video"])

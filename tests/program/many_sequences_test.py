@@ -115,10 +115,10 @@ class ManySequences(ProgramTest):
         cls.names = ["street-0", "street-1", "street-2", "more/street-3"]
         lines = [f"{name} '{cls.folder}/s {i}'" for i, name in enumerate(cls.names)]
         lines[1] += f" --poses '{cls.folder}/s 1/poses.txt' --frames 1:2  # a comment"
-        cls.list.write_text("# NAME INPUT\n\n" + "\n".join(lines) + "\n")
+        cls.list.write_bytes("\r\n".join(["# NAME INPUT", "", *lines, ""]).encode())  # as some editors write
 
-    def run_line(self, index, out, code=0):
-        done = subprocess.run([SOURCE / "examples/cluster/run_line", self.list, str(index), out, *map(str, METHOD), "--quiet"],
+    def run_line(self, index, out, *arguments, code=0):
+        done = subprocess.run([SOURCE / "examples/cluster/run_line", self.list, str(index), out, *map(str, METHOD), "--quiet", *arguments],
                               capture_output=True, text=True, timeout=900, env=dict(os.environ, EGOSGM=PROGRAM))
         self.assertEqual(done.returncode, code, done.stderr)
         return done.stderr
@@ -135,7 +135,8 @@ class ManySequences(ProgramTest):
             self.assertIn("give the number of a line", self.run_line(index, out, code=2))
         whole = self.list.read_text()
         try:
-            for text, said in (("# none\n", "has no line 0"), (f"name '{self.folder}/s 1' --set \"p1=5\n", "a quote without an end")):
+            for text, said in (("# none\n", "has no line 0"), (f"name '{self.folder}/s 1' --set \"p1=5\n", "a quote without an end"),
+                               (f"../name '{self.folder}/s 1'\n", "leads out of"), (f"'a' '{self.folder}/s 1'\na '{self.folder}/s 2'\n", 'lines 0 and 1 of')):
                 self.list.write_text(text)
                 self.assertIn(said, self.run_line(0, out, code=2))
         finally:
@@ -148,6 +149,7 @@ class ManySequences(ProgramTest):
         times = report.stat().st_mtime_ns
         self.run_line(0, out)
         self.assertEqual(report.stat().st_mtime_ns, times)
+        self.assertIn("is finished, and was made of", self.run_line(0, out, "--set", "p2=100", code=2))
         whole = last.read_bytes()
         stopped, images = self.new_folder(), [self.folder / f"s 0/image_0/00000{i}.png" for i in (1, 2)]
         pixels = [image.read_bytes() for image in images]

@@ -10,7 +10,7 @@ import shutil
 import unittest
 
 from browser import CHROMIUM, Browser
-from program_case import FRAMES, HEIGHT, WIDTH, ProgramTest
+from program_case import FRAMES, HEIGHT, WIDTH, ProgramTest, grey_png
 
 LAYERS = ["left image", "disparity", "variance", "disparities searched", "reason", "error [px]"]
 
@@ -196,6 +196,20 @@ class Report(ReportTest):
         self.assert_works("report", copy)
         data = self.data(copy / "report.html")
         self.assertEqual((data["pictures"][0]["layers"][0]["name"], len(data["notes"])), ("left image", 3))
+
+    def test_what_was_changed_after_the_run_is_not_shown(self):
+        copy = self.copy_of_the_run()
+        (copy / "poses.txt").write_text("".join((copy / "poses.txt").read_text().splitlines(True)[1:]))
+        report = self.report(copy)
+        for frame in report["frames"]:
+            frame["left"] = str(copy / "disparity/other.png")
+        (copy / "report.json").write_text(json.dumps(report))
+        (copy / "disparity/other.png").write_bytes(grey_png(64, 48))
+        self.assert_works("report", copy, "--pictures", 0)
+        data = self.data(copy / "report.html")
+        self.assertEqual((data["path"], [layer["name"] for layer in data["pictures"][0]["layers"]][0]), ([], "disparity"))
+        self.assertIn(f"poses.txt has {FRAMES - 1} poses and report.json {FRAMES} frames", " ".join(data["notes"]))
+        self.assertIn("other.png is 64x48 while the run's images were", " ".join(data["notes"]))
 
     def test_what_is_no_run_is_refused(self):
         copy = self.copy_of_the_run()

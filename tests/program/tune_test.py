@@ -83,6 +83,8 @@ class TuneFiles(ProgramTest):
                        {"a, driver b": {"hello": 3}}, {"a": 7}):
             file.write_text(broken if isinstance(broken, str) else json.dumps(broken))
             with self.subTest(broken):
-                self.assert_refused_and_untouched(folder, ["tune", *TUNE, "ForwardWarp", "--file", file], file)
+                others = [device for device in broken if isinstance(broken, dict) and isinstance(broken[device], dict)]
+                said = [f'of "{others[0]}"', "take that entry out"] if others else []
+                self.assert_refused_and_untouched(folder, ["tune", *TUNE, "ForwardWarp", "--file", file], file, *said)
                 if isinstance(broken, str) or key in broken:
                     self.assert_refused([*run, file, "--out", self.folder / "never"], file, "egosgm tune")

@@ -357,6 +357,7 @@ def test_the_matcher_has_opencvs_values(street, frames):
     np.testing.assert_array_equal(matcher.compute(blue, blue), matcher.compute(*[((3735 * blue[..., 0].astype(np.uint32) + (1 << 14)) >> 15).astype(np.uint8)] * 2))
     colours = [np.dstack([255 - image[::-1], image, image // 2, image[:, ::-1]]) for image in (frames[0].left, frames[0].right)]  # BGRA
     np.testing.assert_array_equal(matcher.compute(*colours), matcher.compute(*(image[..., :3] for image in colours)))
+    expect_refused(f"left is {WIDTH}x{HEIGHT}, right 48x{HEIGHT}: give a pair of one size", lambda: matcher.compute(frames[0].left, frames[0].right[:, :48]))
     assert matcher.compute(frames[0].left[:48], frames[0].right[:48]).shape == (48, WIDTH)
     eight, default = (egosgm.Matcher(disparities=48, **given).compute(frames[0].left, frames[0].right) for given in ({"paths": 8}, {}))
     np.testing.assert_array_equal(default, eight)

@@ -85,6 +85,9 @@ def test_a_wall_comes_nearer():
     near = egosgm.move_map(wall, camera, forward(5))
     seen = near > NO
     np.testing.assert_allclose(near[seen], 10, rtol=1e-6)
+    np.testing.assert_array_equal(egosgm.move_map(wall, camera, egosgm.Motion(forward(5))), near)
+    expect_refused(r"current_from_previous: is an array of shape \(1, 4, 4\): give one motion, a Motion or a 4 x 4 array", lambda: egosgm.move_map(wall, camera, forward(5)[None]))
+    expect_refused("is a str: give one motion", lambda: egosgm.move_map(wall, camera, "forward"))
     assert not seen[10, 21] and seen[10, 22], "points move apart, from the principal point on"
 
 

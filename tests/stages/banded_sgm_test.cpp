@@ -223,11 +223,11 @@ TEST(BandedSgmStripes, OfPathsAreThoseOfEveryDevice) {
 }
 
 TEST(BandedSgmStripes, TooLittleMemoryForOneNamesTheLimit) {
-  expect_refused<DeviceError>(
+  expect_refused<InvalidArgument>(
       [] {
         match({.size = {640, 120}, .range = {0, 1024}}, 7);
       },
-      {"BandedSgm", "96 rows", "max_memory_mib allows 7 MiB", "fewer disparities"});
+      {"BandedSgm", "96 rows", "max_memory_mib allows 7 MiB: raise it to ", "fewer disparities"});
 }
 
 TEST(BandedSgmPathsGroup, LargerThanTheDeviceAllowsNamesTheLimit) {

@@ -147,6 +147,8 @@ def is_set(info: Any) -> bool:
 
 
 def _check(info: Any, name: str) -> None:
+    if 0 in _size(info):
+        raise _egosgm.InvalidArgument(f"{name}: the camera info is of {info.width}x{info.height} px, in bins of {info.binning_x}x{info.binning_y}, which leaves no pixel: it has to say the images' size")
     for field in "KPRD":
         values = _values(info, field)
         if not np.isfinite(values).all():

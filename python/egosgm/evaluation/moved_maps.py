@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from .. import _egosgm
 from .maps import disparity_of, is_valid
-from .pose_evaluation import poses_of
+from .pose_evaluation import motion_of
 
 _BAND_ROWS = 16
 
@@ -35,10 +35,10 @@ def move(disparity: np.ndarray, calibration: Any, motion: np.ndarray) -> Tuple[n
     return inside, place, there
 
 
-def move_map(disparity: ArrayLike, calibration: Any, current_from_previous: ArrayLike) -> np.ndarray:
-    """A disparity map as the next frame sees it, the nearest surface on top; INVALID_DISPARITY where nothing lies."""
+def move_map(disparity: ArrayLike, calibration: Any, current_from_previous: "_egosgm.Motion | ArrayLike") -> np.ndarray:
+    """A disparity map as the next frame sees it, the nearest surface on top; INVALID_DISPARITY where nothing lies. current_from_previous: 4 x 4, or a Motion."""
     before = disparity_of(disparity, "disparity")
-    inside, place, there = move(before, calibration, poses_of([current_from_previous], "current_from_previous")[0])
+    inside, place, there = move(before, calibration, motion_of(current_from_previous, "current_from_previous"))
     with np.errstate(invalid="ignore"):
         inside &= there > _egosgm.INVALID_DISPARITY
     place, value = place[inside], there[inside].astype(np.float32)

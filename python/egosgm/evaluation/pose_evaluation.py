@@ -2,7 +2,7 @@
 """Poses beside the true ones, as KITTI's odometry kit compares them (Geiger, Lenz and Urtasun, CVPR 2012)."""
 import dataclasses
 import math
-from typing import List
+from typing import Any, List
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -68,6 +68,15 @@ def poses_of(matrices: ArrayLike, name: str) -> np.ndarray:
     if not is_rigid.all():
         raise _egosgm.InvalidArgument(f"{name}: matrix {int(np.argmin(is_rigid))} is no rotation with a translation, [R t; 0 1]: give poses as they were found")
     return poses
+
+
+def motion_of(motion: Any, name: str) -> np.ndarray:
+    """The (4, 4) array of a Motion, or of one given as such. Throws InvalidArgument, naming it."""
+    matrix = motion.current_from_previous if isinstance(motion, _egosgm.Motion) else motion
+    shape = np.shape(matrix)
+    if shape != (4, 4):
+        raise _egosgm.InvalidArgument(f"{name}: is {f'an array of shape {shape}' if shape else f'a {type(motion).__name__}'}: give one motion, a Motion or a 4 x 4 array")
+    return poses_of([matrix], name)[0]
 
 
 def inverse(poses: np.ndarray) -> np.ndarray:

@@ -292,10 +292,10 @@ class EgosgmNode(TellingNode):
 
 def main() -> int:
     process.prepare()
-    rclpy.init()
     try:
+        rclpy.init()
         node = EgosgmNode()
-    except (ParameterException, ValueError) as error:
+    except (ParameterException, RuntimeError, ValueError) as error:
         rclpy.try_shutdown()
         print(f"egosgm_node: {error}", file=sys.stderr)
         return 1
