@@ -98,7 +98,7 @@ py::array grey_of(const py::array& colour) {
 py::ssize_t element_bytes(const py::array& array) { return array.attr("itemsize").cast<py::ssize_t>(); }
 
 ImageArray image_of(const py::object& image, const char* name) {
-  constexpr const char* kWanted = "a grey image, H x W of uint8 or uint16, or a colour one, H x W x 3 or 4";
+  constexpr const char* kWanted = "a grey image, H x W of uint8 or uint16, or a colour one, H x W x 3 or 4, RGB";
   py::array array = as_array(image, name, kWanted);
   if (array.ndim() == 3 && (array.shape(2) == 3 || array.shape(2) == 4 || array.shape(2) == 1)) array = grey_of(array);
   const bool bytes = array.dtype().equal(py::dtype::of<std::uint8_t>());

@@ -141,8 +141,8 @@ Image parse_npy(std::string_view bytes, const std::filesystem::path& file) {
   const std::string_view values = bytes.substr(static_cast<std::size_t>(header.data() - bytes.data()) + header.size());
   const std::size_t expected = static_cast<std::size_t>(size.area()) * numbers->bytes;
   if (values.size() != expected) {
-    refuse(file,
-           "it holds " + std::to_string(values.size()) + " bytes of numbers instead of " + std::to_string(expected));
+    refuse(file, "it holds " + std::to_string(values.size()) + " bytes of numbers instead of " +
+                     std::to_string(expected) + ": was it cut?");
   }
   Image map(size, kF32);
   const char* next = values.data();

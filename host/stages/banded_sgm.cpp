@@ -108,15 +108,18 @@ int rows_at_once(const ocl::Context& context, shared::ImageSize size, shared::Di
   while (rows > 0 && !fits(rows, StripeMemory::bytes(size.width, rows, words))) --rows;
   const int least = 3 * BandedSgm::kStripeOverlap;
   if (rows >= least) return fewest_rows(size.height, rows, BandedSgm::kStripeOverlap);
-  const auto needed = [&](int stripe_rows) {
-    return demand(context, {size.width, stripe_rows}, range, options, chunks).total +
-           (stripe_rows < size.height ? StripeMemory::bytes(size.width, stripe_rows, words) : 0);
+  const auto demand_of = [&](int stripe_rows) {
+    Demand needs = demand(context, {size.width, stripe_rows}, range, options, chunks);
+    if (stripe_rows < size.height) needs.total += StripeMemory::bytes(size.width, stripe_rows, words);
+    return needs;
   };
   int fewest = std::min(size.height, least);
-  if (needed(size.height) < needed(fewest)) fewest = size.height;  // it copies nothing
-  const std::string mib = std::to_string((needed(fewest) >> 20) + 1);
+  if (demand_of(size.height).total < demand_of(fewest).total) fewest = size.height;  // it copies nothing
+  const Demand needed = demand_of(fewest);
+  const bool device_suffices = needed.total <= device_limit && needed.largest_buffer <= context.max_allocation_bytes();
+  const std::string mib = std::to_string((needed.total >> 20) + 1);
   const std::string needs = "BandedSgm: a stripe of " + std::to_string(fewest) + " rows needs " + mib + " MiB, ";
-  if (chosen > 0 && chosen < device_limit) {
+  if (device_suffices) {  // so that the option alone is in the way
     throw InvalidArgument(needs + "max_memory_mib allows " + std::to_string(chosen >> 20) + " MiB: raise it to " + mib +
                           " or more, or choose fewer disparities or a smaller image");
   }

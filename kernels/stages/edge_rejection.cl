@@ -27,11 +27,10 @@ COMPILED_ONCE void reject_row(const WorkItem at, const ImageSize size, const int
 
   FOR_PIXELS(x, width) {
     const Floats d = load_pixels(here, x, width);
-    const Ints jumps =
-        (d > INVALID) & (is_jump(d, load_pixels(here, x - 1, width), load_pixels(here, x - 2, width), max_jump) |
-                         is_jump(d, load_pixels(here, x + 1, width), load_pixels(here, x + 2, width), max_jump) |
-                         is_jump(d, load_pixels(above, x, width), load_pixels(far_above, x, width), max_jump) |
-                         is_jump(d, load_pixels(below, x, width), load_pixels(far_below, x, width), max_jump));
+    const Ints jumps = is_jump(d, load_pixels(here, x - 1, width), load_pixels(here, x - 2, width), max_jump) |
+                       is_jump(d, load_pixels(here, x + 1, width), load_pixels(here, x + 2, width), max_jump) |
+                       is_jump(d, load_pixels(above, x, width), load_pixels(far_above, x, width), max_jump) |
+                       is_jump(d, load_pixels(below, x, width), load_pixels(far_below, x, width), max_jump);
     store_pixels(jumps ? INVALID : d, kept + row, x, width);
   }
 }

@@ -43,6 +43,9 @@ class Matcher:
     def compute(self, left: NDArray[Any], right: NDArray[Any]) -> NDArray[np.int16]:
         """A rectified pair of uint8 or uint16: grey, H x W, or colour as cv2.imread gives it, H x W x 3 or 4, BGR or BGRA."""
         left, right = (image[..., 2::-1] if image.ndim == 3 and image.shape[2] in (3, 4) else image for image in map(np.asanyarray, (left, right)))  # with masks, which are refused
+        for name, image in (("left", left), ("right", right)):
+            if image.dtype not in (np.uint8, np.uint16):
+                raise _egosgm.InvalidArgument(f"{name} is an array of {image.dtype}: give uint8 or uint16, grey, H x W, or colour, H x W x 3 or 4, BGR")
         made_for = left.shape[:2], left.dtype
         if left.ndim == right.ndim == 2 and left.shape != right.shape:
             raise _egosgm.InvalidArgument(f"left is {left.shape[1]}x{left.shape[0]}, right {right.shape[1]}x{right.shape[0]}: give a pair of one size")

@@ -20,7 +20,7 @@ class Accuracy(ProgramTest):
 
     def test_synthetic_sequence_with_true_poses(self):
         street = self.new_folder()
-        self.assert_works("synth", "--out", street, "--frames", 10, "--quiet")
+        self.assert_works("synth", "--out", street, "--frames", 20, "--quiet")
         method, search = self.of_later_frames(street, "on")
         single, _ = self.of_later_frames(street, "off")
         self.assertLessEqual(method["bad_or_missing"], 2.0)

@@ -152,8 +152,8 @@ def test_a_standard_output_that_is_full_costs_no_calibration(pictures, tmp_path,
         raise egosgm.IoError("the standard output cannot be written")
 
     monkeypatch.setattr("egosgm.calibration.calibrate.tell", full)
-    assert program.run_tool(command(some_of(pictures, tmp_path / "some", 7), tmp_path / "calib.yml")) == 1
-    assert egosgm.read_calibration(tmp_path / "calib.yml").size == (WIDTH, HEIGHT)
+    assert program.run_tool(command(pictures, tmp_path / "calib.yml")) == 1
+    expect_the_cameras(tmp_path / "calib.yml")
 
 
 def test_of_the_many_views_of_a_video_some_are_taken(pictures, tmp_path, capsys, monkeypatch):
@@ -171,7 +171,8 @@ def test_a_charuco_board(tmp_path, capsys):
     expect_the_cameras(tmp_path / "calib.yml", within_px=8)
     for board in ("7x5", "6x8"):  # its inner corners, and rows first
         code, said = calibrate(folder, tmp_path / "wrong.yml", capsys, "--marker", "0.02", board=board)
-        assert code == 2 and f"is it a ChArUco board of {board} squares" in said, said  # OpenCV 5 finds none of this size, OpenCV 4 corners that fit nothing
+        assert code == 2 and f"is it a ChArUco board of {board} squares" in said, said
+        assert ("was found in 0 left and 0 right images" if cv2.__version__ >= "5" else "px, with which nothing can be rectified") in said, said
         assert not (tmp_path / "wrong.yml").exists()
 
 

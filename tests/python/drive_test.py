@@ -358,6 +358,7 @@ def test_the_matcher_has_opencvs_values(street, frames):
     colours = [np.dstack([255 - image[::-1], image, image // 2, image[:, ::-1]]) for image in (frames[0].left, frames[0].right)]  # BGRA
     np.testing.assert_array_equal(matcher.compute(*colours), matcher.compute(*(image[..., :3] for image in colours)))
     expect_refused(f"left is {WIDTH}x{HEIGHT}, right 48x{HEIGHT}: give a pair of one size", lambda: matcher.compute(frames[0].left, frames[0].right[:, :48]))
+    expect_refused("right is an array of float64: give uint8 or uint16, .* BGR", lambda: matcher.compute(frames[0].left, frames[0].right.astype(float)))
     assert matcher.compute(frames[0].left[:48], frames[0].right[:48]).shape == (48, WIDTH)
     eight, default = (egosgm.Matcher(disparities=48, **given).compute(frames[0].left, frames[0].right) for given in ({"paths": 8}, {}))
     np.testing.assert_array_equal(default, eight)
