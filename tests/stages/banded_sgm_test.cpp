@@ -296,6 +296,7 @@ const std::vector<Case> kBanded{
     {{320, 97}, {-50, 128}},
     {{40, 30}, {0, 1024}},
     {.size = {127, 33}, .range = {0, 128}, .patch = 12},
+    {.size = {127, 33}, .range = {0, 24}, .patch = 7},
     {.size = {127, 33}, .range = {-9, 77}, .paths = 4, .patch = 5},
     {.size = {127, 33}, .range = {0, 96}, .cost = MatchingCost::kCensus9x7, .paths = 4, .patch = 20}};
 
@@ -337,7 +338,9 @@ std::vector<Case> in_small_tiles() {
   std::vector<Case> cases;
   for (const BandedSgm::Tile tile : {BandedSgm::Tile{7, 3}, {9, 4}, {5, 5}}) {
     for (const bool banded : {false, true}) {
-      cases.push_back({.size = {31, 23}, .range = {0, 37}, .banded = banded, .tile = tile});
+      for (const int disparities : {32, 37}) {
+        cases.push_back({.size = {31, 23}, .range = {0, disparities}, .banded = banded, .tile = tile});
+      }
     }
   }
   return cases;
