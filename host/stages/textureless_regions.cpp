@@ -26,7 +26,7 @@ void TexturelessRegions::leave_out(const ocl::Buffer<cl_uchar>& images, Map& dis
   }
   counts_.fill(stage_.enter(), 0);
   stage_.launch(count_, each, stage_.size(), views.row_step, disparity, labels_, counts_);
-  stage_.launch(leave_out_, each, stage_.size(), views.row_step, labels_, counts_, disparity);
+  stage_.launch(leave_out_, each, stage_.size(), views.row_step, images, labels_, counts_, disparity);
 }
 
 }  // namespace egosgm

@@ -8,7 +8,8 @@
 namespace egosgm {
 
 /// Leaves out the disparities of textureless regions that run out of the image at its top, where fewer than half of a
-/// region's pixels have one: they are those of outlines beside it, as beneath a sky.
+/// region's pixels have one: they are those of outlines beside it, as beneath a sky. Pixels of the blocks beside such a
+/// region that are about as bright go with it.
 class TexturelessRegions {
  public:
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
@@ -28,7 +29,8 @@ class TexturelessRegions {
   ocl::Kernel<const shared::ImageSize, const ocl::Buffer<cl_uchar>, Labels> find_;
   ocl::Kernel<const shared::ImageSize, const cl_int, Labels> spread_;
   ocl::Kernel<const shared::ImageSize, const cl_int, const Map, const Labels, Counts> count_;
-  ocl::Kernel<const shared::ImageSize, const cl_int, const Labels, const Counts, Map> leave_out_;
+  ocl::Kernel<const shared::ImageSize, const cl_int, const ocl::Buffer<cl_uchar>, const Labels, const Counts, Map>
+      leave_out_;
 };
 
 }  // namespace egosgm

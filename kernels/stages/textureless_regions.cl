@@ -3,6 +3,9 @@
 // such a region there: what little of it has a disparity, has that of the outlines beside it. So where fewer than half
 // of its pixels have one, none of them is published. A wall in the sun is filled from all of its sides, and stays.
 //
+// The blocks beside such a region hold its outline, which lends its disparity to the pixels around. Of these blocks,
+// the pixels that are about as bright as the region's blocks beside them are not published, either.
+//
 // Textureless blocks of EGOSGM_COARSE x EGOSGM_COARSE pixels that touch by their sides are a region. Its label is the
 // least column of its blocks at the top, counted from 1 on. Labels spread along columns and rows by turns. A block that
 // they do not reach in EGOSGM_TEXTURELESS_SPREADS turns stays.
@@ -25,16 +28,34 @@ static inline int4 are_textureless(const int4 least, const int4 largest) {
   return EGOSGM_TEXTURELESS_CONTRAST * (largest - least) < largest;
 }
 
-static inline int block_is_textureless(const ImageSize size, global const Pixel* image, const int x, const int y) {
-  Pixel least = image[(size_t)y * size.width + x], largest = least;
-  for (int v = y; v < min(y + EGOSGM_COARSE, size.height); ++v) {
-    for (int u = x; u < min(x + EGOSGM_COARSE, size.width); ++u) {
-      const Pixel grey = image[(size_t)v * size.width + u];
-      least = min(least, grey);
-      largest = max(largest, grey);
+// The least and the largest grey value of pixels.
+typedef struct {
+  Pixel least, largest;
+} GreyRange;
+#define NO_GREYS ((GreyRange){(Pixel)~0, 0})
+
+static inline GreyRange grey_range(const Pixel grey) {
+  const GreyRange greys = {grey, grey};
+  return greys;
+}
+static inline GreyRange joined_greys(const GreyRange a, const GreyRange b) {
+  const GreyRange greys = {min(a.least, b.least), max(a.largest, b.largest)};
+  return greys;
+}
+static inline int is_textureless(const GreyRange greys) {
+  return are_textureless((int4)(greys.least), (int4)(greys.largest)).x;
+}
+
+// REQUIRES: a block of the image.
+static inline GreyRange greys_of_block(const ImageSize size, global const Pixel* image, const int x, const int y) {
+  const int left = EGOSGM_COARSE * x, top = EGOSGM_COARSE * y;
+  GreyRange greys = NO_GREYS;
+  for (int v = top; v < min(top + EGOSGM_COARSE, size.height); ++v) {
+    for (int u = left; u < min(left + EGOSGM_COARSE, size.width); ++u) {
+      greys = joined_greys(greys, grey_range(image[(size_t)v * size.width + u]));
     }
   }
-  return are_textureless((int4)(least), (int4)(largest)).x;
+  return greys;
 }
 
 #if PIXELS > 1
@@ -68,7 +89,7 @@ COMPILED_ONCE void find_in_row(const WorkItem at, const ImageSize size, global c
       continue;
     }
 #endif
-    row[x] = block_is_textureless(size, image, EGOSGM_COARSE * x, EGOSGM_COARSE * at.y) ? label : TEXTURED;
+    row[x] = is_textureless(greys_of_block(size, image, x, at.y)) ? label : TEXTURED;
   }
 }
 
@@ -140,24 +161,52 @@ KERNEL void count_filled(const ImageSize size, const int row_step, global const 
   count_row(THIS_WORK_ITEM, size, row_step, disparity, labels, counts);
 }
 
+// Whether a block is one of a region that is left out, by its view's labels and counts.
+static inline int is_left_out(const ImageSize blocks, global const ushort* labels, global const int* counts,
+                              const int x, const int y) {
+  if (x < 0 || y < 0 || x >= blocks.width || y >= blocks.height) return 0;
+  const ushort label = labels[y * blocks.width + x];
+  return has_label(blocks, label) && 2 * counts[2 * label + 1] < counts[2 * label];
+}
+
+// The grey values of the blocks beside one that are left out, or NO_GREYS.
+static inline GreyRange greys_beside(const ImageSize size, global const Pixel* image, global const ushort* labels,
+                                     global const int* counts, const int x, const int y) {
+  GreyRange greys = NO_GREYS;
+  for (int v = y - 1; v <= y + 1; ++v) {
+    for (int u = x - 1; u <= x + 1; ++u) {
+      if (!is_left_out(coarse_size(size), labels, counts, u, v)) continue;
+      greys = joined_greys(greys, greys_of_block(size, image, u, v));
+    }
+  }
+  return greys;
+}
+
 COMPILED_ONCE void leave_out_of_row(const WorkItem at, const ImageSize size, const int row_step,
-                                    global const ushort* labels, global const int* counts, global float* disparity) {
+                                    global const uchar* images, global const ushort* labels, global const int* counts,
+                                    global float* disparity) {
   const ImageSize blocks = coarse_size(size);
-  global float* view = disparity + (size_t)at.view * size.height * size.width;
-  global const ushort* row = labels + ((size_t)at.view * blocks.height + at.y) * blocks.width;
-  global const int* of_view = counts + 2 * at.view * (blocks.width + 1);
+  const size_t first = (size_t)at.view * size.height * size.width;
+  global const Pixel* image = (global const Pixel*)images + first;
+  global const ushort* of_view = labels + (size_t)at.view * blocks.height * blocks.width;
+  global const int* counts_of_view = counts + 2 * at.view * (blocks.width + 1);
   FOR_BLOCKS_OF_ROW(x, blocks) {
-    const ushort label = row[x];
-    if (!has_label(blocks, label) || 2 * of_view[2 * label + 1] >= of_view[2 * label]) continue;
+    const int whole = is_left_out(blocks, of_view, counts_of_view, x, at.y);
+    if (!whole && of_view[at.y * blocks.width + x] != TEXTURED) continue;
+    const GreyRange beside = whole ? NO_GREYS : greys_beside(size, image, of_view, counts_of_view, x, at.y);
+    if (!whole && beside.largest < beside.least) continue;
     for (int v = EGOSGM_COARSE * at.y; v < min(EGOSGM_COARSE * (at.y + 1), size.height); ++v) {
       for (int u = EGOSGM_COARSE * x; u < min(EGOSGM_COARSE * (x + 1), size.width) && v % row_step == 0; ++u) {
-        view[(size_t)v * size.width + u] = EGOSGM_INVALID_DISPARITY;
+        const size_t i = (size_t)v * size.width + u;
+        if (whole || is_textureless(joined_greys(beside, grey_range(image[i])))) {
+          disparity[first + i] = EGOSGM_INVALID_DISPARITY;
+        }
       }
     }
   }
 }
 
-KERNEL void leave_out(const ImageSize size, const int row_step, global const ushort* labels, global const int* counts,
-                      global float* disparity) {
-  leave_out_of_row(THIS_WORK_ITEM, size, row_step, labels, counts, disparity);
+KERNEL void leave_out(const ImageSize size, const int row_step, global const uchar* images, global const ushort* labels,
+                      global const int* counts, global float* disparity) {
+  leave_out_of_row(THIS_WORK_ITEM, size, row_step, images, labels, counts, disparity);
 }

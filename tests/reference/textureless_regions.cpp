@@ -32,29 +32,36 @@ void spread(Blocks& blocks, int dx, int dy) {
   }
 }
 
+bool has_no_texture(const std::vector<int>& greys) {
+  const auto [least, largest] = std::minmax_element(greys.begin(), greys.end());
+  return 24 * (*largest - *least) < *largest;
+}
+
 }  // namespace
 
 std::vector<float> textureless_regions(shared::ImageSize size, const std::vector<int>& images, int row_step,
                                        std::vector<float> disparity) {
   for (int view = 0; view < 2; ++view) {
     Blocks blocks{(size.width + kSide - 1) / kSide, (size.height + kSide - 1) / kSide, {}, {}};
-    const auto pixels_of = [&](int x, int y) {
+    const auto pixels_of = [&](int block) {
+      const int left = kSide * (block % blocks.columns), top = kSide * (block / blocks.columns);
       std::vector<std::size_t> pixels;
-      for (int v = kSide * y; v < std::min(kSide * (y + 1), size.height); ++v) {
-        for (int u = kSide * x; u < std::min(kSide * (x + 1), size.width); ++u) {
+      for (int v = top; v < std::min(top + kSide, size.height); ++v) {
+        for (int u = left; u < std::min(left + kSide, size.width); ++u) {
           pixels.push_back((static_cast<std::size_t>(view) * size.height + v) * size.width + u);
         }
       }
       return pixels;
     };
-    for (int y = 0; y < blocks.rows; ++y) {
-      for (int x = 0; x < blocks.columns; ++x) {
-        std::vector<int> greys;
-        for (const std::size_t i : pixels_of(x, y)) greys.push_back(images[i]);
-        const auto [least, largest] = std::minmax_element(greys.begin(), greys.end());
-        blocks.is_textureless.push_back(24 * (*largest - *least) < *largest);
-        blocks.labels.push_back(y == 0 ? x : kNoLabel);
-      }
+    const auto greys_of = [&](int block) {
+      std::vector<int> greys;
+      for (const std::size_t i : pixels_of(block)) greys.push_back(images[i]);
+      return greys;
+    };
+    const int count = blocks.columns * blocks.rows;
+    for (int block = 0; block < count; ++block) {
+      blocks.is_textureless.push_back(has_no_texture(greys_of(block)));
+      blocks.labels.push_back(block < blocks.columns ? block : kNoLabel);
     }
     for (int time = 0; time < 3; ++time) {
       spread(blocks, 0, 1);
@@ -62,18 +69,34 @@ std::vector<float> textureless_regions(shared::ImageSize size, const std::vector
       spread(blocks, 1, 0);
       spread(blocks, -1, 0);
     }
-    for (int label = 0; label < blocks.columns; ++label) {
-      std::vector<std::size_t> region;
-      for (int i = 0; i < blocks.columns * blocks.rows; ++i) {
-        if (!blocks.is_textureless[i] || blocks.labels[i] != label) continue;
-        for (const std::size_t pixel : pixels_of(i % blocks.columns, i / blocks.columns)) {
-          if (pixel / size.width % size.height % row_step == 0) region.push_back(pixel);
+    const auto is_there = [&](std::size_t i) { return i / size.width % size.height % row_step == 0; };
+    const auto is_filled = [&](std::size_t i) { return is_there(i) && disparity[i] != EGOSGM_INVALID_DISPARITY; };
+    std::vector<std::ptrdiff_t> pixels(blocks.columns), filled(blocks.columns);
+    const auto has_label = [&](int block) { return blocks.is_textureless[block] && blocks.labels[block] != kNoLabel; };
+    for (int block = 0; block < count; ++block) {
+      if (!has_label(block)) continue;
+      const std::vector<std::size_t> each = pixels_of(block);
+      pixels[blocks.labels[block]] += std::count_if(each.begin(), each.end(), is_there);
+      filled[blocks.labels[block]] += std::count_if(each.begin(), each.end(), is_filled);
+    }
+    const auto is_left_out = [&](int block) {
+      return has_label(block) && 2 * filled[blocks.labels[block]] < pixels[blocks.labels[block]];
+    };
+    for (int block = 0; block < count; ++block) {
+      std::vector<int> beside;  // the greys of what is left out around a block with texture
+      const int x = block % blocks.columns, y = block / blocks.columns;
+      for (int v = std::max(y - 1, 0); v <= std::min(y + 1, blocks.rows - 1); ++v) {
+        for (int u = std::max(x - 1, 0); u <= std::min(x + 1, blocks.columns - 1); ++u) {
+          if (blocks.is_textureless[block] || !is_left_out(v * blocks.columns + u)) continue;
+          for (const int grey : greys_of(v * blocks.columns + u)) beside.push_back(grey);
         }
       }
-      const auto is_filled = [&](std::size_t i) { return disparity[i] != EGOSGM_INVALID_DISPARITY; };
-      if (2 * std::count_if(region.begin(), region.end(), is_filled) >= static_cast<std::ptrdiff_t>(region.size()))
-        continue;
-      for (const std::size_t i : region) disparity[i] = EGOSGM_INVALID_DISPARITY;
+      for (const std::size_t i : pixels_of(block)) {
+        std::vector<int> with_it = beside;
+        with_it.push_back(images[i]);
+        const bool goes = is_left_out(block) || (!beside.empty() && has_no_texture(with_it));
+        if (goes && is_there(i)) disparity[i] = EGOSGM_INVALID_DISPARITY;
+      }
     }
   }
   return disparity;

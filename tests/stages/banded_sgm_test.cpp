@@ -296,7 +296,8 @@ const std::vector<Case> kBanded{
     {{320, 97}, {-50, 128}},
     {{40, 30}, {0, 1024}},
     {.size = {127, 33}, .range = {0, 128}, .patch = 12},
-    {.size = {127, 33}, .range = {0, 24}, .patch = 7},
+    {.size = {127, 33}, .range = {0, 24}, .patch = 8},
+    {.size = {127, 33}, .range = {0, 128}, .cost = MatchingCost::kCensus9x7, .patch = 16},
     {.size = {127, 33}, .range = {-9, 77}, .paths = 4, .patch = 5},
     {.size = {127, 33}, .range = {0, 96}, .cost = MatchingCost::kCensus9x7, .paths = 4, .patch = 20}};
 

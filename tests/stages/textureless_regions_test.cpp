@@ -109,10 +109,27 @@ TEST(TexturelessRegions, ReachBehindWhatHangsIntoThem) {
 TEST(TexturelessRegions, AreBrightForTheirRange) {
   Sky sky;
   sky.disparity[0] = 5;
-  sky.images[1] = 208;  // 24 times 8 is less than it
-  EXPECT_EQ(run(sky.size, PixelType::kU8, sky.images, Views::kBoth, sky.disparity)[0], EGOSGM_INVALID_DISPARITY);
-  sky.images[2] = 199;  // but 24 times 9 is not
-  EXPECT_EQ(run(sky.size, PixelType::kU8, sky.images, Views::kBoth, sky.disparity)[0], 5.0f);
+  const auto after = [&] { return run(sky.size, PixelType::kU8, sky.images, Views::kBoth, sky.disparity)[0]; };
+  for (int i = 1; i < 8 * 64; i += 4) sky.images[i] = 208;  // 24 times 8 is less than it
+  EXPECT_EQ(after(), EGOSGM_INVALID_DISPARITY);
+  for (int i = 2; i < 8 * 64; i += 4) sky.images[i] = 199;  // but 24 times 9 is not
+  EXPECT_EQ(after(), 5.0f);
+}
+
+// An outline lends its disparity to the pixels around, some of which lie in its own blocks.
+TEST(TexturelessRegions, TakeThePixelsOfTheBlocksBesideThemThatAreAsBright) {
+  Sky sky;
+  const auto after = [&](int x, int y) {
+    return run(sky.size, PixelType::kU8, sky.images, Views::kBoth, sky.disparity)[y * 64 + x];
+  };
+  sky.images[8 * 64 + 20] = 200;
+  EXPECT_EQ(after(20, 8), EGOSGM_INVALID_DISPARITY);
+  EXPECT_EQ(after(21, 8), 5.0f) << "is darker";
+  sky.images[8 * 64 + 20] = 209;  // 24 times 9 is not less than it
+  EXPECT_EQ(after(20, 8), 5.0f);
+  for (int i = 0; i < 300; ++i) sky.disparity[i] = 5;
+  sky.images[8 * 64 + 20] = 200;
+  EXPECT_EQ(after(20, 8), 5.0f) << "beside a region that stays";
 }
 
 TEST(TexturelessRegions, AreNotTheBlackEdgesOfARectifiedImage) {
