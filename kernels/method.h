@@ -74,7 +74,7 @@
 #define EGOSGM_SAME_SURFACE_PX 4.0f
 // A block without texture: so many times the range of its grey values is less than the largest of them. Labels of
 // regions spread so many times, along columns and then along rows.
-#define EGOSGM_TEXTURELESS_CONTRAST 24
+#define EGOSGM_TEXTURELESS_CONTRAST 12
 #define EGOSGM_TEXTURELESS_SPREADS 3
 // The coarse match confirms a disparity that differs by no more than one and a half of its pixels, and contradicts
 // others: its right view has whole ones.

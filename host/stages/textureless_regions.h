@@ -7,9 +7,9 @@
 
 namespace egosgm {
 
-/// Leaves out the disparities of textureless regions that run out of the image at its top, where fewer than half of a
-/// region's pixels have one: they are those of outlines beside it, as beneath a sky. Pixels of the blocks beside such a
-/// region that are about as bright go with it.
+/// Leaves out the disparities of textureless regions that run out of the image at its top, where fewer than three
+/// quarters of a region's pixels have one: they are those of outlines beside it, as beneath a sky. Pixels of the blocks
+/// beside such a region that are about as bright go with it.
 class TexturelessRegions {
  public:
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // TexturelessRegions leaves out what runs out of the image at its top without a texture, as a sky does. Nothing bounds
-// such a region there: what little of it has a disparity, has that of the outlines beside it. So where fewer than half
-// of its pixels have one, none of them is published. A wall in the sun is filled from all of its sides, and stays.
+// such a region there: what little of it has a disparity, has that of the outlines beside it. So where fewer than
+// three quarters of its pixels have one, none of them is published. A wall in the sun is filled from all of its sides,
+// and stays.
 //
 // The blocks beside such a region hold its outline, which lends its disparity to the pixels around. Of these blocks,
 // the pixels that are about as bright as the region's blocks beside them are not published, either.
@@ -166,7 +167,7 @@ static inline int is_left_out(const ImageSize blocks, global const ushort* label
                               const int x, const int y) {
   if (x < 0 || y < 0 || x >= blocks.width || y >= blocks.height) return 0;
   const ushort label = labels[y * blocks.width + x];
-  return has_label(blocks, label) && 2 * counts[2 * label + 1] < counts[2 * label];
+  return has_label(blocks, label) && 4 * counts[2 * label + 1] < 3 * counts[2 * label];
 }
 
 // The grey values of the blocks beside one that are left out, or NO_GREYS.

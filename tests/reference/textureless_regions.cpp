@@ -34,7 +34,7 @@ void spread(Blocks& blocks, int dx, int dy) {
 
 bool has_no_texture(const std::vector<int>& greys) {
   const auto [least, largest] = std::minmax_element(greys.begin(), greys.end());
-  return 24 * (*largest - *least) < *largest;
+  return 12 * (*largest - *least) < *largest;
 }
 
 }  // namespace
@@ -80,7 +80,7 @@ std::vector<float> textureless_regions(shared::ImageSize size, const std::vector
       filled[blocks.labels[block]] += std::count_if(each.begin(), each.end(), is_filled);
     }
     const auto is_left_out = [&](int block) {
-      return has_label(block) && 2 * filled[blocks.labels[block]] < pixels[blocks.labels[block]];
+      return has_label(block) && 4 * filled[blocks.labels[block]] < 3 * pixels[blocks.labels[block]];
     };
     for (int block = 0; block < count; ++block) {
       std::vector<int> beside;  // the greys of what is left out around a block with texture

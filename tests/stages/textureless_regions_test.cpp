@@ -72,9 +72,9 @@ struct Sky {
   }
 };
 
-TEST(TexturelessRegions, AreLeftOutWhereFewerThanHalfOfTheirPixelsHaveADisparity) {
-  EXPECT_EQ(Sky().left_of(255), 0);
-  EXPECT_EQ(Sky().left_of(256), 256);
+TEST(TexturelessRegions, AreLeftOutWhereFewerThanThreeQuartersOfTheirPixelsHaveADisparity) {
+  EXPECT_EQ(Sky().left_of(383), 0);
+  EXPECT_EQ(Sky().left_of(384), 384);
 }
 
 TEST(TexturelessRegions, StayWhereTheyDoNotRunOutOfTheImageAtItsTop) {
@@ -110,9 +110,9 @@ TEST(TexturelessRegions, AreBrightForTheirRange) {
   Sky sky;
   sky.disparity[0] = 5;
   const auto after = [&] { return run(sky.size, PixelType::kU8, sky.images, Views::kBoth, sky.disparity)[0]; };
-  for (int i = 1; i < 8 * 64; i += 4) sky.images[i] = 208;  // 24 times 8 is less than it
+  for (int i = 1; i < 8 * 64; i += 4) sky.images[i] = 208;  // 12 times 17 is less than it
   EXPECT_EQ(after(), EGOSGM_INVALID_DISPARITY);
-  for (int i = 2; i < 8 * 64; i += 4) sky.images[i] = 199;  // but 24 times 9 is not
+  for (int i = 2; i < 8 * 64; i += 4) sky.images[i] = 190;  // but 12 times 18 is not
   EXPECT_EQ(after(), 5.0f);
 }
 
@@ -125,9 +125,9 @@ TEST(TexturelessRegions, TakeThePixelsOfTheBlocksBesideThemThatAreAsBright) {
   sky.images[8 * 64 + 20] = 200;
   EXPECT_EQ(after(20, 8), EGOSGM_INVALID_DISPARITY);
   EXPECT_EQ(after(21, 8), 5.0f) << "is darker";
-  sky.images[8 * 64 + 20] = 209;  // 24 times 9 is not less than it
+  sky.images[8 * 64 + 20] = 219;  // 12 times 19 is not less than it
   EXPECT_EQ(after(20, 8), 5.0f);
-  for (int i = 0; i < 300; ++i) sky.disparity[i] = 5;
+  for (int i = 0; i < 400; ++i) sky.disparity[i] = 5;
   sky.images[8 * 64 + 20] = 200;
   EXPECT_EQ(after(20, 8), 5.0f) << "beside a region that stays";
 }
