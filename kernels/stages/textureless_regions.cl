@@ -170,7 +170,14 @@ static inline int is_left_out(const ImageSize blocks, global const ushort* label
   return has_label(blocks, label) && 4 * counts[2 * label + 1] < 3 * counts[2 * label];
 }
 
-// The grey values of the blocks beside one that are left out, or NO_GREYS.
+// Whether a block of column x in the rows around y is.
+static inline int column_is_left_out(const ImageSize blocks, global const ushort* labels, global const int* counts,
+                                     const int x, const int y) {
+  return is_left_out(blocks, labels, counts, x, y - 1) || is_left_out(blocks, labels, counts, x, y) ||
+         is_left_out(blocks, labels, counts, x, y + 1);
+}
+
+// The grey values of the blocks around one that are left out. REQUIRES: there is one.
 static inline GreyRange greys_beside(const ImageSize size, global const Pixel* image, global const ushort* labels,
                                      global const int* counts, const int x, const int y) {
   GreyRange greys = NO_GREYS;
@@ -191,11 +198,16 @@ COMPILED_ONCE void leave_out_of_row(const WorkItem at, const ImageSize size, con
   global const Pixel* image = (global const Pixel*)images + first;
   global const ushort* of_view = labels + (size_t)at.view * blocks.height * blocks.width;
   global const int* counts_of_view = counts + 2 * at.view * (blocks.width + 1);
+  int asked = at.x - 2, nearest = at.x - 2;  // the last column that was asked, and the last one that is left out
   FOR_BLOCKS_OF_ROW(x, blocks) {
+    for (int u = max(asked, x - 2) + 1; u <= x + 1; ++u) {
+      if (column_is_left_out(blocks, of_view, counts_of_view, u, at.y)) nearest = u;
+    }
+    asked = x + 1;
+    if (nearest < x - 1) continue;
     const int whole = is_left_out(blocks, of_view, counts_of_view, x, at.y);
     if (!whole && of_view[at.y * blocks.width + x] != TEXTURED) continue;
     const GreyRange beside = whole ? NO_GREYS : greys_beside(size, image, of_view, counts_of_view, x, at.y);
-    if (!whole && beside.largest < beside.least) continue;
     for (int v = EGOSGM_COARSE * at.y; v < min(EGOSGM_COARSE * (at.y + 1), size.height); ++v) {
       for (int u = EGOSGM_COARSE * x; u < min(EGOSGM_COARSE * (x + 1), size.width) && v % row_step == 0; ++u) {
         const size_t i = (size_t)v * size.width + u;
